@@ -1,0 +1,28 @@
+# Flags every target shares (interface target stickslip_flags).
+add_library(stickslip_flags INTERFACE)
+target_include_directories(stickslip_flags INTERFACE ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR}/src)
+# No implicit contraction: the compiler may not choose where a fused multiply-add goes, or the bits would depend on it.
+target_compile_options(stickslip_flags INTERFACE -Wall -Wextra -Wno-psabi -ffp-contract=off -fno-math-errno)
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  # AVX2 + FMA (2013) is the minimum: madd() must be one instruction.
+  target_compile_options(stickslip_flags INTERFACE -march=x86-64-v3)
+endif()
+if(STICKSLIP_WERROR)
+  target_compile_options(stickslip_flags INTERFACE -Werror)
+endif()
+if(STICKSLIP_SANITIZE)
+  target_compile_options(stickslip_flags INTERFACE -fsanitize=address,undefined -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  target_link_options(stickslip_flags INTERFACE -fsanitize=address,undefined)
+endif()
+
+# A library of one src/ folder: stickslip_library(<name> SOURCES ... LINKS ...)
+function(stickslip_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
+  if(ARG_SOURCES)
+    add_library(${name} STATIC ${ARG_SOURCES})
+    target_link_libraries(${name} PUBLIC stickslip_flags ${ARG_LINKS})
+  else()
+    add_library(${name} INTERFACE)
+    target_link_libraries(${name} INTERFACE stickslip_flags ${ARG_LINKS})
+  endif()
+endfunction()

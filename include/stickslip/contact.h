@@ -1,0 +1,96 @@
+// Frictional contact problems and their solvers, without robots.
+//
+// For n contacts, find impulses lambda [N s] so that v = G lambda + c [m/s] obeys Signorini's condition and Coulomb's
+// law at each contact (docs/theory/contact.md). Per contact the order is x, y (tangential), z (normal).
+#pragma once
+#include <string>
+#include <vector>
+
+namespace stickslip {
+
+/// Law for sliding contacts.
+enum class FrictionLaw {
+  kCoulomb,         ///< friction exactly opposite to the sliding velocity, [Hwangbo 2018] eq. 6
+  kMaxDissipation,  ///< least kinetic energy of the contact point, [Hwangbo 2018] eq. 8
+};
+
+/// Method for one contact.
+enum class SingleContactMethod { kHalley, kBisection, kGoldenSection, kQuartic };
+
+/// Method for several contacts.
+enum class SolveMethod {
+  kAuto,        ///< warm-started sweeps, one Halley step per visit, Newton finish; the default
+  kPerContact,  ///< [Hwangbo 2018] Algorithm 2
+  kPgs,         ///< projected Gauss-Seidel, [Hwangbo 2018] eq. 17, 18
+};
+
+/// How a solve ended. Anything but kConverged returns the best impulse found, with its residual.
+enum class SolveStatus {
+  kConverged,     ///< the largest contact residual is at most the tolerance
+  kNotConverged,  ///< cause: sweeps or steps used up; the residual says how far; raise max_sweeps or use kAuto
+  kInfeasible,    ///< a contact cannot push (G_zz near 0) and its normal velocity stays negative
+};
+
+/// A dense contact problem. `delassus` is row-major (3n, 3n) [1/kg], symmetric positive semidefinite; `free_velocity` (3n)
+/// [m/s]; `friction` (n) [1], zero or positive.
+struct ContactProblem {
+  std::vector<double> delassus;
+  std::vector<double> free_velocity;
+  std::vector<double> friction;
+  int num_contacts() const { return static_cast<int>(friction.size()); }
+  /// Throws ModelError that names the argument and its first offending index (lengths, NaN, asymmetry, negative
+  /// diagonal, negative friction).
+  void validate() const;
+};
+
+struct SolveOptions {
+  SolveMethod method = SolveMethod::kAuto;
+  FrictionLaw law = FrictionLaw::kCoulomb;
+  double tolerance = 1e-9;  ///< on the largest contact residual [m/s]
+  int max_sweeps = 1000;
+  SingleContactMethod single_contact = SingleContactMethod::kHalley;  ///< kPerContact only
+  double alpha = 1.0;       ///< relaxation at the first sweep; kPgs: the constant factor of eq. 18 (0.6 in the paper)
+  double alpha_min = 0.7;   ///< kPerContact: where alpha decays to
+  double gamma = 1.0;       ///< kPerContact: decay per sweep (0.99 in the paper); 1 keeps alpha
+  bool record_history = false;
+  void validate() const;  ///< throws ModelError
+};
+
+struct SolveResult {
+  std::vector<double> impulse;            ///< (3n) [N s]
+  std::vector<double> velocity;           ///< G impulse + c (3n) [m/s]
+  std::vector<double> contact_residuals;  ///< (n) [m/s]
+  double residual = 0;                    ///< the largest of them [m/s]
+  int sweeps = 0;
+  int newton_steps = 0;
+  SolveStatus status = SolveStatus::kNotConverged;
+  std::vector<double> history;            ///< residual after each sweep [m/s], if recorded
+};
+
+/// Solves a problem; `warm_start` is empty or (3n). Throws only for bad input (see `validate`).
+SolveResult solve(const ContactProblem& problem, const SolveOptions& options = {},
+                  const std::vector<double>& warm_start = {});
+
+/// Residual of each contact (n) [m/s]; a pure function of its arguments and the only definition of "solved" in the project.
+/// Coulomb: De Saxce natural map with rho_i = 3 / trace(G_ii). Maximum dissipation: |G_ii (lambda_i - local_i)|, where
+/// local_i is the exact single-contact solution with the others held.
+std::vector<double> residual(const ContactProblem& problem, const std::vector<double>& impulse,
+                             FrictionLaw law = FrictionLaw::kCoulomb);
+
+struct SingleContactOptions {
+  SingleContactMethod method = SingleContactMethod::kHalley;
+  FrictionLaw law = FrictionLaw::kCoulomb;
+  double tolerance = 1e-10;  ///< kHalley: residual velocity relative to |c|; the others: impulse interval [N s]
+};
+
+struct SingleContactResult {
+  double impulse[3];   ///< [N s]
+  int evaluations = 0; ///< of the gradient or energy; 0 when open or sticking
+  bool converged = true;
+};
+
+/// Solves one contact: `delassus` row-major 3x3 [1/kg], `free_velocity` (3) [m/s].
+SingleContactResult solve_contact(const double delassus[9], const double free_velocity[3], double friction,
+                                  const SingleContactOptions& options = {});
+
+}  // namespace stickslip

@@ -1,0 +1,62 @@
+// Three rows (x, y, z of a contact) handled together: for a plain scalar one SIMD register, for a pack three packs.
+// Either way each row is the same sequence of operations, so the bits are equal.
+#pragma once
+#include "lane/pack.h"
+
+namespace stickslip {
+
+template <class S>
+struct Row3 {
+  S x, y, z;
+};
+template <>
+struct Row3<double> {
+  Pack<double, 4> v;  // lane 3 is unused
+};
+template <>
+struct Row3<float> {
+  Pack<float, 4> v;
+};
+
+template <class S>
+STICKSLIP_INLINE Row3<S> make_row3(S x, S y, S z) {
+  if constexpr (ScalarTraits<S>::kWidth == 1)
+    return {Pack<S, 4>(typename Pack<S, 4>::Vector{x, y, z, S(0)})};
+  else
+    return {x, y, z};
+}
+template <class S>
+STICKSLIP_INLINE void store(const Row3<S>& a, S out[3]) {
+  if constexpr (ScalarTraits<S>::kWidth == 1) {
+    for (int r = 0; r < 3; ++r) out[r] = a.v.v[r];
+  } else {
+    out[0] = a.x, out[1] = a.y, out[2] = a.z;
+  }
+}
+template <class S>
+STICKSLIP_INLINE Row3<S> operator*(const Row3<S>& a, S b) {
+  if constexpr (ScalarTraits<S>::kWidth == 1)
+    return {a.v * Pack<S, 4>(b)};
+  else
+    return {a.x * b, a.y * b, a.z * b};
+}
+template <class S>
+STICKSLIP_INLINE Row3<S> operator+(const Row3<S>& a, const Row3<S>& b) {
+  if constexpr (ScalarTraits<S>::kWidth == 1)
+    return {a.v + b.v};
+  else
+    return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+template <class S>
+STICKSLIP_INLINE Row3<S> madd(const Row3<S>& a, S b, const Row3<S>& c) {  // a * b + c
+  if constexpr (ScalarTraits<S>::kWidth == 1)
+    return {madd(a.v, Pack<S, 4>(b), c.v)};
+  else
+    return {madd(a.x, b, c.x), madd(a.y, b, c.y), madd(a.z, b, c.z)};
+}
+template <class S>
+STICKSLIP_INLINE Row3<S> nmadd(const Row3<S>& a, S b, const Row3<S>& c) {  // c - a * b
+  return madd(a, -b, c);
+}
+
+}  // namespace stickslip
