@@ -1,0 +1,43 @@
+// The certificate of a contact: De Saxce's natural map in velocity units (docs/theory/contact.md
+// (C3)).
+//
+//   u = v + mu |v_T| z,   e = |scale lambda - P_K(scale lambda - u)|,   K the Coulomb cone, scale =
+//   trace(G_ii) / 3
+// It is zero exactly where Signorini's condition and Coulomb's law hold. The projection is
+// homogeneous, so the usual |lambda - P_K(lambda - rho u)| / rho with rho = 1 / scale is this,
+// without a division by a block that may be zero.
+#pragma once
+#include "contact/local.h"
+
+namespace stickslip::contact {
+
+/// Squared natural-map residual of one contact [m^2/s^2] from its velocity [m/s] and impulse [N s].
+/// Pure.
+template <class S>
+STICKSLIP_INLINE S natural_map_residual_squared(const LocalContact<S>& k, const S v[3],
+                                                const S lambda[3]) {
+  const S zero = constant<S>(0), one = constant<S>(1);
+  const S speed = sqrt(madd(v[0], v[0], v[1] * v[1]));
+  const S lx = k.scale * lambda[0], ly = k.scale * lambda[1], lz = k.scale * lambda[2];
+  const S x = lx - v[0], y = ly - v[1], z = lz - madd(k.mu, speed, v[2]);
+  const S norm = sqrt(madd(x, x, y * y));
+  // Projection on the cone: inside, in the polar cone, or on the mantle.
+  const S along = madd(k.mu, norm, z) / madd(k.mu, k.mu, one);
+  const auto inside = norm <= k.mu * z;
+  const auto polar = k.mu * norm <= -z;
+  const auto centered = norm > zero;
+  const S f = select(centered, k.mu * along / select(centered, norm, one), zero);
+  const S px = select(inside, x, select(polar, zero, f * x));
+  const S py = select(inside, y, select(polar, zero, f * y));
+  const S pz = select(inside, z, select(polar, zero, along));
+  const S dx = lx - px, dy = ly - py, dz = lz - pz;
+  return madd(dx, dx, madd(dy, dy, dz * dz));
+}
+
+/// The same, not squared [m/s].
+template <class S>
+STICKSLIP_INLINE S natural_map_residual(const LocalContact<S>& k, const S v[3], const S lambda[3]) {
+  return sqrt(natural_map_residual_squared(k, v, lambda));
+}
+
+}  // namespace stickslip::contact
