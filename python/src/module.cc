@@ -1,0 +1,24 @@
+// The extension module stickslip._core: plain bindings. The documented front is in python/stickslip/*.py.
+#include <stickslip/errors.h>
+
+#include "bindings.h"
+
+namespace nb = nanobind;
+
+NB_MODULE(_core, m) {
+  m.doc() = "C++ core of stickslip. Use the names of the package `stickslip`; these may change.";
+
+  // ModelError is a std::invalid_argument, which nanobind turns into a ValueError.
+  nb::register_exception_translator([](const std::exception_ptr& p, void*) {
+    try {
+      std::rethrow_exception(p);
+    } catch (const stickslip::FileError& e) {
+      PyErr_SetString(PyExc_FileNotFoundError, e.what());
+    }
+  });
+
+  stickslip::python::bind_model(m);
+  stickslip::python::bind_contact(m);
+  stickslip::python::bind_world(m);
+  stickslip::python::bind_scenes(m);
+}
