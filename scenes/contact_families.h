@@ -1,5 +1,5 @@
-// Random single-contact problems: four families, each a mix of opening, sticking and sliding contacts.
-// Used by tests and benchmarks. Double, libm allowed: none of it is a kernel.
+// Random single-contact problems: four families, each a mix of opening, sticking and sliding
+// contacts. Used by tests and benchmarks. Double, libm allowed: none of it is a kernel.
 #pragma once
 #include <array>
 #include <cmath>
@@ -18,7 +18,8 @@ enum class ContactFamily {
   kNearDiagonal,   ///< like a foot straight below the body
   kWishart,        ///< G = A A^T / 6 with A 3x6 normal
   kRobotFoot,      ///< foot of a three-joint leg on a floating box, random posture
-  kIllConditioned  ///< condition numbers up to 1e6, friction up to 3: a sixth of the conics is unbounded
+  kIllConditioned  ///< condition numbers up to 1e6, friction up to 3: a sixth of the conics is
+                   ///< unbounded
 };
 inline const char* family_name(ContactFamily f) {
   constexpr const char* kNames[] = {"near diagonal", "Wishart", "robot foot", "ill-conditioned"};
@@ -77,8 +78,9 @@ inline Mat3 random_rotation(Random& rng) {
   for (double& x : q) x = rng.normal(), n += x * x;
   for (double& x : q) x /= std::sqrt(n);
   const auto [w, x, y, z] = q;
-  return {1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), 2 * (x * y + w * z), 1 - 2 * (x * x + z * z),
-          2 * (y * z - w * x), 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)};
+  return {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
+          2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+          2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
 }
 /// Q diag(d) Q^T
 inline Mat3 conjugate(const Mat3& q, const Vec3& d) {
@@ -91,12 +93,15 @@ inline Mat3 conjugate(const Mat3& q, const Vec3& d) {
   return r;
 }
 
-/// G = J M^-1 J^T of the foot of a leg with three joints (roll, pitch, pitch) on a floating box of 20 kg.
+/// G = J M^-1 J^T of the foot of a leg with three joints (roll, pitch, pitch) on a floating box of
+/// 20 kg.
 inline Mat3 robot_foot(Random& rng) {
   constexpr double kMass[3] = {1.5, 2.5, 0.6}, kLength[3] = {0.08, 0.28, 0.30};
   const double q[3] = {rng.uniform(-0.6, 0.6), rng.uniform(-1.3, 1.3), rng.uniform(-2.4, 2.4)};
-  const Mat3 base = multiply(rotation(0, rng.uniform(-0.4, 0.4)), rotation(1, rng.uniform(-0.4, 0.4)));
-  const Vec3 hip = multiply(base, Vec3{rng.uniform(-1, 1) < 0 ? -0.3 : 0.3, rng.uniform(-1, 1) < 0 ? -0.12 : 0.12, 0});
+  const Mat3 base =
+      multiply(rotation(0, rng.uniform(-0.4, 0.4)), rotation(1, rng.uniform(-0.4, 0.4)));
+  const Vec3 hip = multiply(
+      base, Vec3{rng.uniform(-1, 1) < 0 ? -0.3 : 0.3, rng.uniform(-1, 1) < 0 ? -0.12 : 0.12, 0});
   Mat3 link[3];
   Vec3 joint[4] = {hip}, axis[3];
   for (int i = 0; i < 3; ++i) {
@@ -107,15 +112,19 @@ inline Mat3 robot_foot(Random& rng) {
     for (int k = 0; k < 3; ++k) joint[i + 1][k] = joint[i][k] + along[k];
   }
   // Rows of the Jacobian of a point on link `last` (6 base dofs, 3 joints): linear, angular.
-  const auto jacobian = [&](const Vec3& point, int last, double linear[3][9], double angular[3][9]) {
+  const auto jacobian = [&](const Vec3& point, int last, double linear[3][9],
+                            double angular[3][9]) {
     for (int r = 0; r < 3; ++r)
       for (int j = 0; j < 9; ++j) linear[r][j] = angular[r][j] = 0;
     for (int j = 0; j < 3; ++j) {
-      const Vec3 unit{j == 0 ? 1.0 : 0.0, j == 1 ? 1.0 : 0.0, j == 2 ? 1.0 : 0.0}, turn = cross(unit, point);
-      for (int r = 0; r < 3; ++r) linear[r][j] = angular[r][3 + j] = unit[r], linear[r][3 + j] = turn[r];
+      const Vec3 unit{j == 0 ? 1.0 : 0.0, j == 1 ? 1.0 : 0.0, j == 2 ? 1.0 : 0.0},
+          turn = cross(unit, point);
+      for (int r = 0; r < 3; ++r)
+        linear[r][j] = angular[r][3 + j] = unit[r], linear[r][3 + j] = turn[r];
     }
     for (int j = 0; j <= last; ++j) {
-      const Vec3 arm{point[0] - joint[j][0], point[1] - joint[j][1], point[2] - joint[j][2]}, turn = cross(axis[j], arm);
+      const Vec3 arm{point[0] - joint[j][0], point[1] - joint[j][1], point[2] - joint[j][2]},
+          turn = cross(axis[j], arm);
       for (int r = 0; r < 3; ++r) linear[r][6 + j] = turn[r], angular[r][6 + j] = axis[j][r];
     }
   };
@@ -160,7 +169,8 @@ inline Mat3 random_block(ContactFamily family, Random& rng, double& mu) {
   mu = rng.uniform(0.1, 1.2);
   switch (family) {
     case ContactFamily::kNearDiagonal: {
-      Mat3 G = conjugate(random_rotation(rng), {rng.uniform(0, 0.1), rng.uniform(0, 0.1), rng.uniform(0, 0.1)});
+      Mat3 G = conjugate(random_rotation(rng),
+                         {rng.uniform(0, 0.1), rng.uniform(0, 0.1), rng.uniform(0, 0.1)});
       const double tangential = rng.uniform(0.5, 2);
       G[0] += tangential, G[4] += tangential, G[8] += rng.uniform(0.5, 2);
       return G;
@@ -190,18 +200,22 @@ inline Mat3 random_block(ContactFamily family, Random& rng, double& mu) {
   }
 }
 
-/// The sliding impulse of least energy, by halving the gradient's sign on the visible arc; false if the contact sticks.
-/// Its norm scales the problems, so that tolerances in N s mean the same in every family.
+/// The sliding impulse of least energy, by halving the gradient's sign on the visible arc; false if
+/// the contact sticks. Its norm scales the problems, so that tolerances in N s mean the same in
+/// every family.
 inline bool slip_impulse(const Mat3& G, const Vec3& c, double mu, Vec3& lambda) {
   const double a = -c[2] / G[8], wx = G[2] / G[8], wy = G[5] / G[8];
   const double sxx = G[0] - G[2] * wx, sxy = G[1] - G[2] * wy, syy = G[4] - G[5] * wy;
   const double bx = c[0] + G[2] * a, by = c[1] + G[5] * a, det = sxx * syy - sxy * sxy;
-  const double x = -(syy * bx - sxy * by) / det, y = -(sxx * by - sxy * bx) / det, z = a - wx * x - wy * y;
+  const double x = -(syy * bx - sxy * by) / det, y = -(sxx * by - sxy * bx) / det,
+               z = a - wx * x - wy * y;
   if (z >= 0 && std::hypot(x, y) <= mu * z * (1 + 1e-9)) return false;
-  const double start = std::atan2(y, x), k = mu * z / std::hypot(x, y), half = k < -1 ? M_PI : std::acos(std::fmin(k, 1));
+  const double start = std::atan2(y, x), k = mu * z / std::hypot(x, y),
+               half = k < -1 ? M_PI : std::acos(std::fmin(k, 1));
   double lo = -half, hi = half;
   for (int i = 0; i < 80; ++i) {
-    const double middle = (lo + hi) / 2, ex = std::cos(start + middle), ey = std::sin(start + middle);
+    const double middle = (lo + hi) / 2, ex = std::cos(start + middle),
+                 ey = std::sin(start + middle);
     const double d = 1 + mu * (wx * ex + wy * ey), r = mu * a / d;
     lambda = {r * ex, r * ey, r / mu};
     const double vx = sxx * r * ex + sxy * r * ey + bx, vy = sxy * r * ex + syy * r * ey + by;
@@ -215,9 +229,10 @@ inline bool slip_impulse(const Mat3& G, const Vec3& c, double mu, Vec3& lambda) 
 
 enum class ContactMix { kAll, kSlipOnly };
 
-/// `count` problems of a family: a third opens, a third sticks, a third slides (kSlipOnly: all slide). The impulse of a
-/// closing contact has norm 1 N s.
-inline std::vector<SingleContact> random_contacts(ContactFamily family, int count, std::uint64_t seed,
+/// `count` problems of a family: a third opens, a third sticks, a third slides (kSlipOnly: all
+/// slide). The impulse of a closing contact has norm 1 N s.
+inline std::vector<SingleContact> random_contacts(ContactFamily family, int count,
+                                                  std::uint64_t seed,
                                                   ContactMix mix = ContactMix::kAll) {
   Random rng(seed);
   std::vector<SingleContact> out;
@@ -233,13 +248,15 @@ inline std::vector<SingleContact> random_contacts(ContactFamily family, int coun
       // c = -G lambda for a lambda inside the cone
       const double angle = rng.uniform(-M_PI, M_PI), t = p.mu * std::sqrt(rng.uniform(0, 0.999));
       const double n = 1 / std::sqrt(1 + t * t);
-      p.c = families::multiply(p.G, {-n * t * std::cos(angle), -n * t * std::sin(angle), -n});
+      p.c = families::multiply(
+          p.G, families::Vec3{-n * t * std::cos(angle), -n * t * std::sin(angle), -n});
       if (!(p.c[2] < 0)) continue;
     } else {
       p.c[2] = -std::fabs(p.c[2]);
       std::array<double, 3> lambda;
       if (!families::slip_impulse(p.G, p.c, p.mu, lambda)) continue;
-      const double norm = std::sqrt(lambda[0] * lambda[0] + lambda[1] * lambda[1] + lambda[2] * lambda[2]);
+      const double norm =
+          std::sqrt(lambda[0] * lambda[0] + lambda[1] * lambda[1] + lambda[2] * lambda[2]);
       for (double& x : p.c) x /= norm;
     }
     out.push_back(p);
