@@ -4,40 +4,10 @@
 // Closed form loses digits where roots meet or q_4 vanishes (nearly isotropic G): that is the method's weakness, so its
 // failures are reported. `polish` Newton steps repair most of them. Stop criterion: the next Newton step in impulse.
 #pragma once
+#include "contact/halley.h"
 #include "contact/slip.h"
 
 namespace stickslip::contact {
-
-/// Quartic of one sliding contact, lowest power first, and the direction of tau = 0.
-struct SlipQuartic {
-  double q[5];
-  double ex, ey;  // e_0
-};
-
-/// (C17); kappa 1: maximum dissipation, 0: Coulomb.
-inline SlipQuartic slip_quartic(const SlipProblem& p, double kappa) {
-  const double length = sqrt(p.stick_x * p.stick_x + p.stick_y * p.stick_y);
-  const double ex = p.stick_x / length, ey = p.stick_y / length;
-  // S, b = -S stick_T and mu w in the basis (e_0, J e_0)
-  const double s00 = p.sxx * ex * ex + 2 * p.sxy * ex * ey + p.syy * ey * ey;
-  const double s11 = p.sxx * ey * ey - 2 * p.sxy * ex * ey + p.syy * ex * ex;
-  const double s01 = (p.syy - p.sxx) * ex * ey + p.sxy * (ex * ex - ey * ey);
-  const double b0 = -length * s00, b1 = -length * s01;
-  const double m0 = p.mu * (ex * p.wx + ey * p.wy), m1 = p.mu * (ex * p.wy - ey * p.wx);
-  const double mu_a = p.mu * p.a;
-  const double a00 = mu_a * s00 + b0 * m0, a01 = mu_a * s01 + b0 * m1;
-  const double a10 = mu_a * s01 + b1 * m0, a11 = mu_a * s11 + b1 * m1;
-  const double k0 = kappa * m0, k1 = kappa * m1;
-  const double bc = b1 + a10 * k0 - a00 * k1, cc = -b0 + a11 * k0 - a01 * k1, dc = b1 * k0 - b0 * k1;
-  SlipQuartic s;
-  s.q[0] = a10 + bc + dc;
-  s.q[1] = 2 * (a11 - a00 + cc);
-  s.q[2] = 2 * (dc - a10) - 4 * a01;
-  s.q[3] = 2 * (a00 - a11 + cc);
-  s.q[4] = a10 - bc + dc;
-  s.ex = ex, s.ey = ey;
-  return s;
-}
 
 /// Real roots of z^3 + c2 z^2 + c1 z + c0: the largest one.
 inline double largest_cubic_root(double c2, double c1, double c0) {
@@ -88,24 +58,29 @@ STICKSLIP_INLINE double quartic_step(const double q[5], double t) {
   return slope != 0 ? -value / slope : 0;
 }
 
-inline SlipSolution solve_quartic(const SlipProblem& p, bool coulomb, double tolerance, int polish = 2) {
-  const SlipQuartic s = slip_quartic(p, coulomb ? 0 : 1);
+template <bool kMaxDissipation>
+inline SlipSolution solve_quartic(const LocalContact<double>& k, const Reduced<double>& reduced, double tolerance,
+                                  int polish = 2) {
+  const SlipProblem p = slip_problem(k, reduced);
+  const double length = 1 / sqrt(p.stick_x * p.stick_x + p.stick_y * p.stick_y);
+  const SlipQuartic<double> s = slip_quartic<kMaxDissipation>(k, reduced, p.stick_x * length, p.stick_y * length);
+  const double coefficients[5] = {s.q0, s.q1, s.q2, s.q3, s.q4};
   double roots[4];
-  const int count = quartic_roots(s.q, roots);
+  const int count = quartic_roots(coefficients, roots);
   ConicPoint best{s.ex, s.ey, 1 + p.mu * (p.wx * s.ex + p.wy * s.ey), 0};
   best.r = p.mu * p.a / best.d;
   double best_value = 1e300, best_tau = 0;
   bool found = false;
   for (int i = 0; i < count; ++i) {
     double t = roots[i];
-    for (int k = 0; k < polish; ++k) t += quartic_step(s.q, t);
+    for (int k = 0; k < polish; ++k) t += quartic_step(coefficients, t);
     const double inv = 1 / (1 + t * t), cosine = (1 - t * t) * inv, sine = 2 * t * inv;
     ConicPoint q{cosine * s.ex - sine * s.ey, cosine * s.ey + sine * s.ex, 0, 0};
     q.d = 1 + p.mu * (p.wx * q.x + p.wy * q.y);
     if (!(q.d > 0)) continue;  // the branch that does not exist
     q.r = p.mu * p.a / q.d;
     double value;
-    if (coulomb) {
+    if constexpr (!kMaxDissipation) {
       // Sliding must oppose friction, v_T = -alpha e with alpha >= 0; of several solutions the one nearest to sticking.
       const double vx = p.sxx * q.r * q.x + p.sxy * q.r * q.y + p.bx, vy = p.sxy * q.r * q.x + p.syy * q.r * q.y + p.by;
       value = -(vx * q.x + vy * q.y);
@@ -117,7 +92,7 @@ inline SlipSolution solve_quartic(const SlipProblem& p, bool coulomb, double tol
   }
   if (!found) return slip_solution(p, best, 1, false);
   // What another Newton step would change, as an impulse (C14): |d lambda / d theta| = r |e + mu w| |(1, w)| / d at most.
-  const double turn = 2 * abs(quartic_step(s.q, best_tau)) / (1 + best_tau * best_tau);
+  const double turn = 2 * abs(quartic_step(coefficients, best_tau)) / (1 + best_tau * best_tau);
   const double nx = best.x + p.mu * p.wx, ny = best.y + p.mu * p.wy;
   const double speed = best.r / best.d * sqrt((nx * nx + ny * ny) * (1 + p.wx * p.wx + p.wy * p.wy));
   return slip_solution(p, best, 1, turn * speed <= tolerance);

@@ -34,6 +34,10 @@ struct ConicPoint {
   double r;     // |lambda_T| [N s]; meaningful where d > 0
 };
 
+STICKSLIP_INLINE SlipProblem slip_problem(const LocalContact<double>& k, const Reduced<double>& r) {
+  return {r.a, k.wx, k.wy, k.sxx, k.sxy, k.syy, r.bx, r.by, k.mu, r.x, r.y, r.z};
+}
+
 STICKSLIP_INLINE ConicPoint conic_point(const SlipProblem& p, double angle) {
   ConicPoint q;
   sincos(angle, q.y, q.x);

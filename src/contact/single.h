@@ -1,0 +1,63 @@
+// One contact, any method: open, stick and mu = 0 are settled here, a slip goes to the chosen method.
+#pragma once
+#include "contact/bisection.h"
+#include "contact/golden_section.h"
+#include "contact/halley.h"
+#include "contact/quartic.h"
+
+namespace stickslip::contact {
+
+/// Evaluations at which solve_slip gives up (halley.h).
+inline constexpr int kHalleyCap = 80;
+
+enum class Method { kHalley, kBisection, kGoldenSection, kQuartic };
+
+/// The impulse [N s] of one contact whose velocity without it is c [m/s]. `evaluations` is 0 when it opens or sticks.
+/// Tolerance: kHalley: residual velocity [m/s]; the others: impulse interval [N s].
+template <Method method, bool kMaxDissipation>
+STICKSLIP_INLINE SlipSolution solve_single(const LocalContact<double>& k, const double c[3], double tolerance) {
+  const Reduced<double> r = reduce(k, c[0], c[1], c[2]);
+  if (r.stick) return {r.x, r.y, r.z, 0, true};
+  if (!r.slip) return {0, 0, 0, 0, true};
+  if (!(k.mu > 0)) return {0, 0, r.a, 0, true};
+  if constexpr (method == Method::kHalley) {
+    double lambda[3];
+    int evaluations;
+    solve_slip<kMaxDissipation>(k, r, tolerance, lambda, evaluations);
+    return {lambda[0], lambda[1], lambda[2], evaluations, evaluations < kHalleyCap};
+  } else if constexpr (method == Method::kBisection) {
+    return solve_bisection(slip_problem(k, r), !kMaxDissipation, tolerance);
+  } else if constexpr (method == Method::kGoldenSection) {
+    static_assert(kMaxDissipation, "golden section minimizes eq. 8");
+    return solve_golden_section(slip_problem(k, r), tolerance);
+  } else {
+    return solve_quartic<kMaxDissipation>(k, r, tolerance);
+  }
+}
+
+/// Calls f with the method and the law as compile-time constants: f(MethodTag<m>, LawTag<l>).
+template <Method m>
+struct MethodTag {
+  static constexpr Method value = m;
+};
+template <bool kMaxDissipation>
+struct LawTag {
+  static constexpr bool value = kMaxDissipation;
+};
+template <class F>
+inline void with_method(Method method, bool max_dissipation, F&& f) {
+  const auto law = [&](auto tag) {
+    if (max_dissipation)
+      f(tag, LawTag<true>{});
+    else if constexpr (decltype(tag)::value != Method::kGoldenSection)  // has no Coulomb form
+      f(tag, LawTag<false>{});
+  };
+  switch (method) {
+    case Method::kHalley: return law(MethodTag<Method::kHalley>{});
+    case Method::kBisection: return law(MethodTag<Method::kBisection>{});
+    case Method::kGoldenSection: return law(MethodTag<Method::kGoldenSection>{});
+    case Method::kQuartic: return law(MethodTag<Method::kQuartic>{});
+  }
+}
+
+}  // namespace stickslip::contact
