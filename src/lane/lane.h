@@ -1,14 +1,17 @@
-// The scalar S of every kernel: double, float, or a pack of them, one environment (or one branch of a tree) per lane.
+// The scalar S of every kernel: double, float, or a pack of them, one environment (or one branch of
+// a tree) per lane.
 //
-// Kernels use only what this folder defines: + - * /, madd, sqrt, compare, select, any/all and the polynomials of math.h.
-// Each is one correctly rounded IEEE 754 operation, so a lane's bits depend neither on the width nor on its neighbours.
+// Kernels use only what this folder defines: + - * /, madd, sqrt, compare, select, any/all and the
+// polynomials of math.h. Each is one correctly rounded IEEE 754 operation, so a lane's bits depend
+// neither on the width nor on its neighbours.
 #pragma once
 
 #define STICKSLIP_INLINE inline __attribute__((always_inline))
 
 namespace stickslip {
 
-/// What a scalar type is made of: `Value` (one lane), `Mask` (result of a comparison), `kWidth` (lanes).
+/// What a scalar type is made of: `Value` (one lane), `Mask` (result of a comparison), `kWidth`
+/// (lanes).
 template <class S>
 struct ScalarTraits;
 

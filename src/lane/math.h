@@ -1,16 +1,20 @@
-// Our own elementary functions: the same bits for every scalar type, compiler and machine. No libm in a kernel.
+// Our own elementary functions: the same bits for every scalar type, compiler and machine. No libm
+// in a kernel.
 #pragma once
 #include "lane/lane.h"
 
 namespace stickslip {
 
-/// sin and cos of x [rad], |x| < 1e5: reduction modulo pi/2 in three parts, then minimax polynomials (fdlibm's for
-/// double, Cephes' for float). Error about 1 ulp: 1.1e-16 in double, 9e-8 in float.
+/// sin and cos of x [rad], |x| < 1e5: reduction modulo pi/2 in three parts, then minimax
+/// polynomials (fdlibm's for double, Cephes' for float). Error about 1 ulp: 1.1e-16 in double, 9e-8
+/// in float.
 template <class S>
 STICKSLIP_INLINE void sincos(S x, S& sine, S& cosine) {
   constexpr bool kFloat = sizeof(Value<S>) == 4;
   const auto c = [](double k) { return constant<S>(k); };
-  const S round = c(kFloat ? 12582912.0 : 6755399441055744.0);  // 1.5 * 2^23, 1.5 * 2^52: adding it rounds to an integer
+  const S round =
+      c(kFloat ? 12582912.0
+               : 6755399441055744.0);  // 1.5 * 2^23, 1.5 * 2^52: adding it rounds to an integer
   const S k = madd(x, c(0.63661977236758134308), round) - round;  // nearest multiple of pi/2
   S r, ps, pc;
   if constexpr (kFloat) {
@@ -18,8 +22,11 @@ STICKSLIP_INLINE void sincos(S x, S& sine, S& cosine) {
     r = nmadd(k, c(4.83751296997e-4), r);
     r = nmadd(k, c(7.5497899549e-8), r);
     const S z = r * r;
-    ps = madd(r * z, madd(z, madd(z, c(-1.9515295891e-4), c(8.3321608736e-3)), c(-1.6666654611e-1)), r);
-    pc = madd(z * z, madd(z, madd(z, c(2.443315711809948e-5), c(-1.388731625493765e-3)), c(4.166664568298827e-2)),
+    ps = madd(r * z, madd(z, madd(z, c(-1.9515295891e-4), c(8.3321608736e-3)), c(-1.6666654611e-1)),
+              r);
+    pc = madd(z * z,
+              madd(z, madd(z, c(2.443315711809948e-5), c(-1.388731625493765e-3)),
+                   c(4.166664568298827e-2)),
               nmadd(z, c(0.5), c(1)));
   } else {
     r = nmadd(k, c(1.57079632673412561417), x);
@@ -54,8 +61,9 @@ template <class S>
 STICKSLIP_INLINE S atan2(S y, S x) {
   const auto c = [](double k) { return constant<S>(k); };
   const S ay = abs(y), ax = abs(x);
-  const auto steep = ay > ax * c(2.41421356237309504880);  // tan(3 pi / 8): atan t = pi/2 + atan(-1/t)
-  const auto middle = ay > ax * c(0.66);                   // atan t = pi/4 + atan((t - 1) / (t + 1))
+  const auto steep =
+      ay > ax * c(2.41421356237309504880);  // tan(3 pi / 8): atan t = pi/2 + atan(-1/t)
+  const auto middle = ay > ax * c(0.66);    // atan t = pi/4 + atan((t - 1) / (t + 1))
   const S top = select(steep, -ax, select(middle, ay - ax, ay));
   S bottom = select(steep, ay, select(middle, ay + ax, ax));
   bottom = select(bottom > c(0), bottom, c(1));
@@ -71,8 +79,10 @@ STICKSLIP_INLINE S atan2(S y, S x) {
   q = madd(z, q, c(1.945506571482613964425e2));
   S r = madd(t * z, p / q, t);
   // The low halves of pi/2 and pi/4 keep the last bit.
-  const S high = select(steep, c(1.57079632679489661923), select(middle, c(0.78539816339744830962), c(0)));
-  const S low = select(steep, c(6.123233995736765886e-17), select(middle, c(3.061616997868382943e-17), c(0)));
+  const S high =
+      select(steep, c(1.57079632679489661923), select(middle, c(0.78539816339744830962), c(0)));
+  const S low =
+      select(steep, c(6.123233995736765886e-17), select(middle, c(3.061616997868382943e-17), c(0)));
   r = high + (r + low);
   r = select(x < c(0), c(3.14159265358979323846) - (r - c(1.2246467991473531772e-16)), r);
   return select(y < c(0), -r, r);
@@ -86,12 +96,15 @@ STICKSLIP_INLINE S acos(S x) {
   return constant<S>(2) * atan2(sqrt(one - clipped), sqrt(one + clipped));
 }
 
-/// Cube root of any finite double, |error| below 4 ulp: an estimate from the exponent bits, then four Newton steps.
+/// Cube root of any finite double, |error| below 4 ulp: an estimate from the exponent bits, then
+/// four Newton steps.
 STICKSLIP_INLINE double cbrt(double x) {
   const double a = abs(x);
   if (!(a > 1e-300)) return 0;
-  // Dividing the bit pattern by three divides the exponent by three; good to 5 % ("B1" of fdlibm's cbrt).
-  const unsigned long long bits = __builtin_bit_cast(unsigned long long, a) / 3 + 0x2A9F76253119D328ull;
+  // Dividing the bit pattern by three divides the exponent by three; good to 5 % ("B1" of fdlibm's
+  // cbrt).
+  const unsigned long long bits =
+      __builtin_bit_cast(unsigned long long, a) / 3 + 0x2A9F76253119D328ull;
   double r = __builtin_bit_cast(double, bits);
   for (int i = 0; i < 4; ++i) r = madd((a / (r * r) - r), 1.0 / 3.0, r);
   return x < 0 ? -r : r;

@@ -1,4 +1,5 @@
-// Pack<T, W>: W lanes of T over a compiler vector. Why not std::experimental::simd: docs/design/002-pack.md.
+// Pack<T, W>: W lanes of T over a compiler vector. Why not std::experimental::simd:
+// docs/design/002-pack.md.
 #pragma once
 #include "lane/lane.h"
 #if defined(__AVX2__)
@@ -9,12 +10,13 @@
 
 namespace stickslip {
 
-// GCC 12 takes a dependent vector_size typedef for its element type in overload resolution, hence one struct per width.
+// GCC 12 takes a dependent vector_size typedef for its element type in overload resolution, hence
+// one struct per width.
 template <class T, int W>
 struct PackStorage;
-#define STICKSLIP_PACK_STORAGE(T, I, W)                          \
-  template <>                                                    \
-  struct PackStorage<T, W> {                                     \
+#define STICKSLIP_PACK_STORAGE(T, I, W)                           \
+  template <>                                                     \
+  struct PackStorage<T, W> {                                      \
     typedef T Vector __attribute__((vector_size(sizeof(T) * W))); \
     typedef I Ints __attribute__((vector_size(sizeof(I) * W)));   \
   };
@@ -26,7 +28,8 @@ STICKSLIP_PACK_STORAGE(float, int, 8)
 STICKSLIP_PACK_STORAGE(float, int, 16)
 #undef STICKSLIP_PACK_STORAGE
 
-/// One truth value per lane. No conversion to bool: a kernel that branches on one lane does not compile.
+/// One truth value per lane. No conversion to bool: a kernel that branches on one lane does not
+/// compile.
 template <class T, int W>
 struct PackMask {
   typename PackStorage<T, W>::Ints v;  // 0 or -1
@@ -91,7 +94,8 @@ STICKSLIP_INLINE void set_lane(Pack<T, W>& x, int i, T v) {
   reinterpret_cast<T*>(&x)[i] = v;
 }
 
-// Widths without an instruction of their own (a pack wider than the register) go lane by lane; the bits are the same.
+// Widths without an instruction of their own (a pack wider than the register) go lane by lane; the
+// bits are the same.
 template <class T, int W>
 STICKSLIP_INLINE Pack<T, W> madd(Pack<T, W> a, Pack<T, W> b, Pack<T, W> c) {
   Pack<T, W> r;
@@ -105,16 +109,20 @@ STICKSLIP_INLINE Pack<T, W> sqrt(Pack<T, W> a) {
   return r;
 }
 
-#define STICKSLIP_PACK_OPS(T, W, FMA, SQRT)                                                            \
-  STICKSLIP_INLINE Pack<T, W> madd(Pack<T, W> a, Pack<T, W> b, Pack<T, W> c) { return FMA; }           \
+#define STICKSLIP_PACK_OPS(T, W, FMA, SQRT)                                                  \
+  STICKSLIP_INLINE Pack<T, W> madd(Pack<T, W> a, Pack<T, W> b, Pack<T, W> c) { return FMA; } \
   STICKSLIP_INLINE Pack<T, W> sqrt(Pack<T, W> a) { return SQRT; }
 #if defined(__AVX2__) && defined(__FMA__)
 STICKSLIP_PACK_OPS(double, 2, _mm_fmadd_pd(a.v, b.v, c.v), _mm_sqrt_pd(a.v))
 STICKSLIP_PACK_OPS(double, 4, _mm256_fmadd_pd(a.v, b.v, c.v), _mm256_sqrt_pd(a.v))
 STICKSLIP_PACK_OPS(float, 4, _mm_fmadd_ps(a.v, b.v, c.v), _mm_sqrt_ps(a.v))
 STICKSLIP_PACK_OPS(float, 8, _mm256_fmadd_ps(a.v, b.v, c.v), _mm256_sqrt_ps(a.v))
-STICKSLIP_INLINE bool any(PackMask<double, 4> m) { return _mm256_movemask_pd(_mm256_castsi256_pd((__m256i)m.v)); }
-STICKSLIP_INLINE bool any(PackMask<float, 8> m) { return _mm256_movemask_ps(_mm256_castsi256_ps((__m256i)m.v)); }
+STICKSLIP_INLINE bool any(PackMask<double, 4> m) {
+  return _mm256_movemask_pd(_mm256_castsi256_pd((__m256i)m.v));
+}
+STICKSLIP_INLINE bool any(PackMask<float, 8> m) {
+  return _mm256_movemask_ps(_mm256_castsi256_ps((__m256i)m.v));
+}
 #if defined(__AVX512F__)
 STICKSLIP_PACK_OPS(double, 8, _mm512_fmadd_pd(a.v, b.v, c.v), _mm512_sqrt_pd(a.v))
 STICKSLIP_PACK_OPS(float, 16, _mm512_fmadd_ps(a.v, b.v, c.v), _mm512_sqrt_ps(a.v))

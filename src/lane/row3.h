@@ -1,5 +1,5 @@
-// Three rows (x, y, z of a contact) handled together: for a plain scalar one SIMD register, for a pack three packs.
-// Either way each row is the same sequence of operations, so the bits are equal.
+// Three rows (x, y, z of a contact) handled together: for a plain scalar one SIMD register, for a
+// pack three packs. Either way each row is the same sequence of operations, so the bits are equal.
 #pragma once
 #include "lane/pack.h"
 

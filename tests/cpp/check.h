@@ -1,4 +1,5 @@
-// A test harness of one page: TEST(NameIsAClaim) { CHECK(...); }. Each test file is one program; it prints every claim.
+// A test harness of one page: TEST(NameIsAClaim) { CHECK(...); }. Each test file is one program; it
+// prints every claim.
 #pragma once
 #include <cmath>
 #include <cstdio>
@@ -37,30 +38,32 @@ inline std::string show(double a) {
 
 }  // namespace check
 
-#define TEST(name)                                                     \
-  static void name();                                                  \
-  static const bool registered_##name = check::add(#name, name);       \
+#define TEST(name)                                               \
+  static void name();                                            \
+  static const bool registered_##name = check::add(#name, name); \
   static void name()
 #define CHECK(condition) \
   ((condition) ? (void)0 : check::fail(__FILE__, __LINE__, "not true: " #condition))
 /// a and b differ by at most tolerance (absolute); NaN fails.
-#define CHECK_NEAR(a, b, tolerance)                                                                             \
-  (std::fabs((a) - (b)) <= (tolerance)                                                                          \
-       ? (void)0                                                                                                \
-       : check::fail(__FILE__, __LINE__, std::string(#a " = ") + check::show(a) + ", " #b " = " + check::show(b) + \
-                                             ", apart by " + check::show((a) - (b))))
+#define CHECK_NEAR(a, b, tolerance)                                                            \
+  (std::fabs((a) - (b)) <= (tolerance)                                                         \
+       ? (void)0                                                                               \
+       : check::fail(__FILE__, __LINE__,                                                       \
+                     std::string(#a " = ") + check::show(a) + ", " #b " = " + check::show(b) + \
+                         ", apart by " + check::show((a) - (b))))
 /// The statement throws `exception`, and its text contains `fragment`.
-#define CHECK_THROWS(statement, exception, fragment)                                                            \
-  do {                                                                                                          \
-    bool thrown = false;                                                                                        \
-    try {                                                                                                       \
-      statement;                                                                                                \
-    } catch (const exception& e) {                                                                              \
-      thrown = true;                                                                                            \
-      if (!std::strstr(e.what(), fragment))                                                                     \
-        check::fail(__FILE__, __LINE__, std::string("the error does not say '") + fragment + "': " + e.what()); \
-    }                                                                                                           \
-    if (!thrown) check::fail(__FILE__, __LINE__, #statement " did not throw " #exception);                      \
+#define CHECK_THROWS(statement, exception, fragment)                                        \
+  do {                                                                                      \
+    bool thrown = false;                                                                    \
+    try {                                                                                   \
+      statement;                                                                            \
+    } catch (const exception& e) {                                                          \
+      thrown = true;                                                                        \
+      if (!std::strstr(e.what(), fragment))                                                 \
+        check::fail(__FILE__, __LINE__,                                                     \
+                    std::string("the error does not say '") + fragment + "': " + e.what()); \
+    }                                                                                       \
+    if (!thrown) check::fail(__FILE__, __LINE__, #statement " did not throw " #exception);  \
   } while (0)
 
 int main(int argc, char** argv) {

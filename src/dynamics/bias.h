@@ -1,0 +1,36 @@
+// Bias force h of M du/dt + h = tau by the recursive Newton-Euler algorithm [Featherstone 2008,
+// sec. 5.3], outward half: the force each link needs for zero joint accelerations. Uniform
+// translation of the base does not enter.
+#pragma once
+#include "dynamics/kinematics.h"
+
+namespace stickslip::dynamics {
+
+/// Sets every link's `force` to minus its inertial and gravity load at velocity (angular_velocity,
+/// rates), so that `solve_lower_transposed` turns it into L^-T (-h). Also leaves the link
+/// velocities. gravity [m/s^2], world axes.
+template <class S>
+void compute_bias(Tree<S>& t, const Vec3<S>& angular_velocity, const S* rates,
+                  const Vec3<S>& gravity) {
+  using W = Wide<S>;
+  t.base.velocity = {angular_velocity, zero3<S>()};
+  t.base.acceleration = {zero3<S>(), -gravity};
+  const Spatial<S> base_momentum = t.base.inertia * t.base.velocity;
+  t.base.force = -cross_force(t.base.velocity, base_momentum, t.base.inertia * t.base.acceleration);
+  for (int ib = 0; ib < t.num_bundles; ++ib) {
+    const Bundle& b = t.bundles[ib];
+    Spatial<W> v = from_parents<S, Spatial>(t, b, t.base.velocity, &LinkState<W>::velocity);
+    Spatial<W> a = from_parents<S, Spatial>(t, b, t.base.acceleration, &LinkState<W>::acceleration);
+    for (int slot = b.first_slot; slot < b.first_slot + b.length; ++slot) {
+      LinkState<W>& link = t.links[slot];
+      const Spatial<W> joint = link.axis * load_lanes(rates, t.slots[slot].joint);
+      v = v + joint;
+      a = a + cross_motion(v, joint);
+      link.velocity = v;
+      link.acceleration = a;
+      link.force = -cross_force(v, link.inertia * v, link.inertia * a);
+    }
+  }
+}
+
+}  // namespace stickslip::dynamics

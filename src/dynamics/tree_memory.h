@@ -1,0 +1,52 @@
+// Owns the memory of one Tree<S>: made once per robot, so that a step allocates nothing.
+#pragma once
+#include <memory>
+#include <vector>
+
+#include "dynamics/tree.h"
+
+namespace stickslip::dynamics {
+
+template <class S>
+class TreeMemory {
+ public:
+  explicit TreeMemory(const Model& model)
+      : layout_(model, BundleScalar<S>::kLanes),
+        constants_(pack_constants<S>(layout_)),
+        links_(layout_.num_slots) {
+    tree_.floating = layout_.floating;
+    tree_.num_bundles = static_cast<int>(layout_.bundles.size());
+    tree_.num_slots = layout_.num_slots;
+    tree_.num_joints = layout_.num_joints;
+    tree_.bundles = layout_.bundles.data();
+    tree_.slots = layout_.slots.data();
+    tree_.constants = constants_.data();
+    tree_.links = links_.data();
+    tree_.base = {};
+    tree_.base_mass = constant<S>(layout_.base.mass);
+    for (int k = 0; k < 3; ++k) tree_.base_com[k] = constant<S>(layout_.base.center_of_mass[k]);
+    for (int k = 0; k < 6; ++k) tree_.base_inertia[k] = constant<S>(layout_.base.inertia[k]);
+  }
+  TreeMemory(const TreeMemory&) = delete;
+  TreeMemory& operator=(const TreeMemory&) = delete;
+
+  Tree<S>& tree() { return tree_; }
+  const TreeLayout& layout() const { return layout_; }
+  int max_depth() const {
+    int deepest = 0;
+    for (int j = 0; j < layout_.num_joints; ++j) {
+      int depth = 0;
+      for (int k = j; k >= 0; k = layout_.parent_joint[k]) ++depth;
+      deepest = depth > deepest ? depth : deepest;
+    }
+    return deepest;
+  }
+
+ private:
+  TreeLayout layout_;
+  std::vector<LinkConstants<WideConstant<S>>> constants_;
+  std::vector<LinkState<Wide<S>>> links_;
+  Tree<S> tree_;
+};
+
+}  // namespace stickslip::dynamics

@@ -1,0 +1,152 @@
+// Spatial vectors and inertias, all in world axes with the base origin as reference point
+// [Featherstone 2008, ch. 2].
+//
+// One reference point for the whole tree: velocities, forces and inertias of different links add
+// without transforms.
+#pragma once
+#include "spatial/vec3.h"
+
+namespace stickslip {
+
+/// A motion (angular velocity; velocity of the point at the reference) or a force (moment about the
+/// reference; force).
+template <class S>
+struct Spatial {
+  Vec3<S> ang, lin;
+};
+
+template <class S>
+STICKSLIP_INLINE Spatial<S> zero_spatial() {
+  return {zero3<S>(), zero3<S>()};
+}
+template <class S>
+STICKSLIP_INLINE Spatial<S> operator+(const Spatial<S>& a, const Spatial<S>& b) {
+  return {a.ang + b.ang, a.lin + b.lin};
+}
+template <class S>
+STICKSLIP_INLINE Spatial<S> operator-(const Spatial<S>& a, const Spatial<S>& b) {
+  return {a.ang - b.ang, a.lin - b.lin};
+}
+template <class S>
+STICKSLIP_INLINE Spatial<S> operator-(const Spatial<S>& a) {
+  return {-a.ang, -a.lin};
+}
+template <class S>
+STICKSLIP_INLINE Spatial<S> operator*(const Spatial<S>& a, S k) {
+  return {a.ang * k, a.lin * k};
+}
+/// a * k + c
+template <class S>
+STICKSLIP_INLINE Spatial<S> madd(const Spatial<S>& a, S k, const Spatial<S>& c) {
+  return {madd(a.ang, k, c.ang), madd(a.lin, k, c.lin)};
+}
+/// c - a * k
+template <class S>
+STICKSLIP_INLINE Spatial<S> nmadd(const Spatial<S>& a, S k, const Spatial<S>& c) {
+  return {nmadd(a.ang, k, c.ang), nmadd(a.lin, k, c.lin)};
+}
+/// Power of a force on a motion.
+template <class S>
+STICKSLIP_INLINE S dot(const Spatial<S>& a, const Spatial<S>& b) {
+  return dot(a.ang, b.ang, dot(a.lin, b.lin));
+}
+/// Motion cross product v x m.
+template <class S>
+STICKSLIP_INLINE Spatial<S> cross_motion(const Spatial<S>& v, const Spatial<S>& m) {
+  return {cross(v.ang, m.ang), cross(v.ang, m.lin, cross(v.lin, m.ang))};
+}
+/// Force cross product v x* f, plus c.
+template <class S>
+STICKSLIP_INLINE Spatial<S> cross_force(const Spatial<S>& v, const Spatial<S>& f,
+                                        const Spatial<S>& c) {
+  return {cross(v.ang, f.ang, cross(v.lin, f.lin, c.ang)), cross(v.ang, f.lin, c.lin)};
+}
+
+/// Mass, first moment h = m c and rotational inertia about the reference point.
+template <class S>
+struct RigidInertia {
+  S mass;
+  Vec3<S> h;
+  Sym3<S> rot;
+};
+
+template <class S>
+STICKSLIP_INLINE RigidInertia<S> operator+(const RigidInertia<S>& a, const RigidInertia<S>& b) {
+  return {a.mass + b.mass, a.h + b.h, a.rot + b.rot};
+}
+/// Momentum I v.
+template <class S>
+STICKSLIP_INLINE Spatial<S> operator*(const RigidInertia<S>& a, const Spatial<S>& v) {
+  return {madd(a.rot, v.ang, cross(a.h, v.lin)), madd(v.lin, a.mass, -cross(a.h, v.ang))};
+}
+/// Inertia of a body with mass m, centre of mass c and inertia `about_com`, seen from the reference
+/// point.
+template <class S>
+STICKSLIP_INLINE RigidInertia<S> inertia_at_reference(S m, const Vec3<S>& c,
+                                                      const Sym3<S>& about_com) {
+  const Vec3<S> h = c * m;
+  const S xx = h.x * c.x, yy = h.y * c.y, zz = h.z * c.z;
+  return {m,
+          h,
+          {about_com.xx + (yy + zz), nmadd(h.x, c.y, about_com.xy), nmadd(h.x, c.z, about_com.xz),
+           about_com.yy + (xx + zz), nmadd(h.y, c.z, about_com.yz), about_com.zz + (xx + yy)}};
+}
+
+/// Articulated-body inertia: (moment; force) = [aa al; al^T ll] (angular; linear) [Featherstone
+/// 2008, sec. 7.1].
+template <class S>
+struct ArticulatedInertia {
+  Sym3<S> aa;
+  Mat3<S> al;
+  Sym3<S> ll;
+};
+
+template <class S>
+STICKSLIP_INLINE ArticulatedInertia<S> articulated(const RigidInertia<S>& a) {
+  const S o = constant<S>(0);
+  return {a.rot,
+          {{o, -a.h.z, a.h.y, a.h.z, o, -a.h.x, -a.h.y, a.h.x, o}},
+          {a.mass, o, o, a.mass, o, a.mass}};
+}
+template <class S>
+STICKSLIP_INLINE ArticulatedInertia<S> operator+(const ArticulatedInertia<S>& a,
+                                                 const RigidInertia<S>& b) {
+  ArticulatedInertia<S> r = a;
+  r.aa = r.aa + b.rot;
+  r.al.m[1] = r.al.m[1] - b.h.z, r.al.m[2] += b.h.y;
+  r.al.m[3] += b.h.z, r.al.m[5] = r.al.m[5] - b.h.x;
+  r.al.m[6] = r.al.m[6] - b.h.y, r.al.m[7] += b.h.x;
+  r.ll.xx += b.mass, r.ll.yy += b.mass, r.ll.zz += b.mass;
+  return r;
+}
+template <class S>
+STICKSLIP_INLINE ArticulatedInertia<S> operator+(const ArticulatedInertia<S>& a,
+                                                 const ArticulatedInertia<S>& b) {
+  ArticulatedInertia<S> r;
+  r.aa = a.aa + b.aa;
+  for (int i = 0; i < 9; ++i) r.al.m[i] = a.al.m[i] + b.al.m[i];
+  r.ll = a.ll + b.ll;
+  return r;
+}
+template <class S>
+STICKSLIP_INLINE Spatial<S> operator*(const ArticulatedInertia<S>& a, const Spatial<S>& v) {
+  return {madd(a.aa, v.ang, a.al * v.lin), transposed_madd(a.al, v.ang, a.ll * v.lin)};
+}
+/// I - U U^T: what is left of the inertia when a joint with U = I s / sqrt(s . I s) is free to
+/// move.
+template <class S>
+STICKSLIP_INLINE ArticulatedInertia<S> without(const ArticulatedInertia<S>& i,
+                                               const Spatial<S>& u) {
+  const Vec3<S>&n = u.ang, &f = u.lin;
+  ArticulatedInertia<S> r;
+  r.aa = {nmadd(n.x, n.x, i.aa.xx), nmadd(n.x, n.y, i.aa.xy), nmadd(n.x, n.z, i.aa.xz),
+          nmadd(n.y, n.y, i.aa.yy), nmadd(n.y, n.z, i.aa.yz), nmadd(n.z, n.z, i.aa.zz)};
+  r.al = {{nmadd(n.x, f.x, i.al.m[0]), nmadd(n.x, f.y, i.al.m[1]), nmadd(n.x, f.z, i.al.m[2]),
+           nmadd(n.y, f.x, i.al.m[3]), nmadd(n.y, f.y, i.al.m[4]), nmadd(n.y, f.z, i.al.m[5]),
+           nmadd(n.z, f.x, i.al.m[6]), nmadd(n.z, f.y, i.al.m[7]), nmadd(n.z, f.z, i.al.m[8])}};
+  r.ll = {nmadd(f.x, f.x, i.ll.xx), nmadd(f.x, f.y, i.ll.xy), nmadd(f.x, f.z, i.ll.xz),
+          nmadd(f.y, f.y, i.ll.yy), nmadd(f.y, f.z, i.ll.yz), nmadd(f.z, f.z, i.ll.zz)};
+  return r;
+}
+
+}  // namespace stickslip

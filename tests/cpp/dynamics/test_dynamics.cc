@@ -1,0 +1,194 @@
+// The dynamics kernels against each other and across scalars. Pinocchio is the outside oracle
+// (tests/python).
+#include <random>
+#include <vector>
+
+#include "check.h"
+#include "dynamics/bias.h"
+#include "dynamics/contact_rows.h"
+#include "dynamics/mass_matrix.h"
+#include "dynamics/random_robots.h"
+#include "dynamics/tree_memory.h"
+
+using namespace stickslip;
+using namespace stickslip::dynamics;
+
+namespace {
+
+/// What the kernels make of one random state, for any scalar: everything a step uses, in one list.
+template <class S>
+std::vector<S> run_kernels(const Model& model, const std::vector<std::vector<double>>& states) {
+  // states: one environment per lane of S; entries: quaternion (4), angular velocity (3), q, rates
+  TreeMemory<S> memory(model);
+  Tree<S>& t = memory.tree();
+  const int n = model.num_joints();
+  std::vector<S> q(n), rates(n), extra(n), joints(n);
+  S quaternion[4];
+  Vec3<S> w;
+  const auto load = [&](S& to, int k) {
+    for (int lane = 0; lane < ScalarTraits<S>::kWidth; ++lane)
+      set_lane(to, lane, static_cast<Value<S>>(states[lane][k]));
+  };
+  for (int k = 0; k < 4; ++k) load(quaternion[k], k);
+  load(w.x, 4), load(w.y, 5), load(w.z, 6);
+  for (int j = 0; j < n; ++j)
+    load(q[j], 7 + j), load(rates[j], 7 + n + j), extra[j] = constant<S>(0.01);
+  const Vec3<S> gravity{constant<S>(0), constant<S>(0), constant<S>(-9.81)};
+
+  std::vector<S> out;
+  compute_positions(t, quaternion, q.data());
+  compute_inertias(t);
+  factor_mass_matrix(t, extra.data());
+  compute_bias(t, w, rates.data(), gravity);
+  solve_lower_transposed(t, rates.data(), true);
+  S base[6];
+  solve_lower(t, base, joints.data());
+  out.insert(out.end(), base, base + 6);
+  out.insert(out.end(), joints.begin(), joints.end());
+  compute_velocities(t, w, rates.data());
+  multiply_lower(t, w, rates.data());
+  out.push_back(squared_norm(t));
+  const Spatial<S> p = base_momentum(t);
+  out.insert(out.end(), {p.ang.x, p.ang.y, p.ang.z, p.lin.x, p.lin.y, p.lin.z});
+  std::vector<LinkIndex> path(memory.max_depth() + 1);
+  std::vector<Row3<S>> rows(memory.max_depth() + 1);
+  for (const LinkIndex& link : memory.layout().link_of_body) {
+    ContactRows<S> r{0, path.data(), rows.data(), {}};
+    const S half = constant<S>(0.5), o = constant<S>(0), one = constant<S>(1);
+    const Vec3<S> point = point_position(t, link, Vec3<S>{half, o, half});
+    compute_contact_rows(t, link, point, Mat3<S>{{one, o, o, o, one, o, o, o, one}}, r);
+    for (int k = 0; k < r.depth + 6; ++k) {
+      S row[3];
+      store(k < r.depth ? r.joint[k] : r.base[k - r.depth], row);
+      out.insert(out.end(), row, row + 3);
+    }
+  }
+  std::vector<RigidInertia<Wide<S>>> scratch(t.num_slots);
+  std::vector<S> m(model.nu() * model.nu());
+  compute_mass_matrix(t, scratch.data(), m.data());
+  out.insert(out.end(), m.begin(), m.end());
+  return out;
+}
+
+std::vector<double> random_state(const Model& model, unsigned seed) {
+  std::mt19937 rng(seed);
+  std::normal_distribution<double> n;
+  std::vector<double> s(7 + 2 * model.num_joints());
+  for (double& x : s) x = n(rng);
+  const double norm = std::sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2] + s[3] * s[3]);
+  for (int k = 0; k < 4; ++k) s[k] /= norm;
+  return s;
+}
+
+std::vector<ModelPtr> robots() {
+  using testing::random_robot;
+  return {random_robot(1, 12, 4, BaseType::kFloating), random_robot(2, 13, 4, BaseType::kFloating),
+          random_robot(3, 15, 0, BaseType::kFloating), random_robot(4, 7, 1, BaseType::kFixed),
+          random_robot(5, 20, 0, BaseType::kFixed),    random_robot(6, 30, 0, BaseType::kFloating),
+          random_robot(7, 1, 1, BaseType::kFixed),     random_robot(8, 18, 6, BaseType::kFloating)};
+}
+
+template <class Pack>
+void compare_lanes_with_double() {
+  for (const ModelPtr& model : robots()) {
+    std::vector<std::vector<double>> states;
+    for (int lane = 0; lane < ScalarTraits<Pack>::kWidth; ++lane)
+      states.push_back(random_state(*model, 10 + lane));
+    const auto packed = run_kernels<Pack>(*model, states);
+    for (int lane = 0; lane < ScalarTraits<Pack>::kWidth; ++lane) {
+      const auto scalar = run_kernels<Value<Pack>>(*model, {states[lane]});
+      CHECK(scalar.size() == packed.size());
+      int different = 0;
+      for (size_t k = 0; k < scalar.size(); ++k)
+        different += get_lane(packed[k], lane) != scalar[k];
+      CHECK(different == 0);
+    }
+  }
+}
+
+}  // namespace
+
+TEST(DoublePacksEqualDoubleBitForBit) {
+  compare_lanes_with_double<Pack<double, 4>>();
+  compare_lanes_with_double<Pack<double, 8>>();
+}
+
+TEST(FloatPacksEqualFloatBitForBit) {
+  compare_lanes_with_double<Pack<float, 8>>();
+  compare_lanes_with_double<Pack<float, 16>>();
+}
+
+TEST(FloatEqualsDoubleToFloatPrecision) {
+  for (const ModelPtr& model : robots()) {
+    const auto state = random_state(*model, 3);
+    const auto d = run_kernels<double>(*model, {state});
+    const auto f = run_kernels<float>(*model, {state});
+    double scale = 0;
+    for (double x : d) scale = std::max(scale, std::fabs(x));
+    for (size_t k = 0; k < d.size(); ++k) CHECK_NEAR(d[k], double(f[k]), 3e-5 * scale);
+  }
+}
+
+TEST(FactorReproducesTheMassMatrix) {
+  for (const ModelPtr& model : robots()) {
+    TreeMemory<double> memory(*model);
+    Tree<double>& t = memory.tree();
+    const auto s = random_state(*model, 5);
+    const int n = model->num_joints(), nu = model->nu(), offset = nu - n;
+    compute_positions(t, s.data(), s.data() + 7);
+    compute_inertias(t);
+    factor_mass_matrix<double>(t, nullptr);
+    std::vector<RigidInertia<Wide<double>>> scratch(t.num_slots);
+    std::vector<double> m(nu * nu), l(nu * nu), u(nu);
+    compute_mass_matrix(t, scratch.data(), m.data());
+    for (int j = 0; j < nu; ++j) {  // columns of L
+      std::fill(u.begin(), u.end(), 0);
+      u[j] = 1;
+      const double* b = u.data();
+      const Vec3<double> v = offset ? Vec3<double>{b[0], b[1], b[2]} : zero3<double>();
+      const Vec3<double> w = offset ? Vec3<double>{b[3], b[4], b[5]} : zero3<double>();
+      compute_velocities(t, w, b + offset);
+      multiply_lower(t, v, b + offset);
+      for (int i = 0; i < offset; ++i) l[i * nu + j] = t.base.x[i];
+      for (int i = 0; i < n; ++i) {
+        const LinkIndex link = memory.layout().link_of_body[i + 1];
+        l[(offset + i) * nu + j] = get_lane(t.links[link.slot].x, link.lane);
+      }
+      double kinetic = squared_norm(t);
+      CHECK_NEAR(kinetic, m[j * nu + j], 1e-12 * m[j * nu + j]);
+    }
+    double scale = 0;
+    for (double x : m) scale = std::max(scale, std::fabs(x));
+    for (int i = 0; i < nu; ++i)
+      for (int j = 0; j < nu; ++j) {
+        double sum = 0;
+        for (int k = 0; k < nu; ++k) sum += l[k * nu + i] * l[k * nu + j];
+        CHECK_NEAR(sum, m[i * nu + j], 1e-13 * scale);
+      }
+  }
+}
+
+TEST(SolvesInvertTheMassMatrix) {
+  for (const ModelPtr& model : robots()) {
+    TreeMemory<double> memory(*model);
+    Tree<double>& t = memory.tree();
+    const auto s = random_state(*model, 6);
+    const int n = model->num_joints(), nu = model->nu(), offset = nu - n;
+    compute_positions(t, s.data(), s.data() + 7);
+    compute_inertias(t);
+    factor_mass_matrix<double>(t, nullptr);
+    std::vector<RigidInertia<Wide<double>>> scratch(t.num_slots);
+    std::vector<double> m(nu * nu), a(nu);
+    compute_mass_matrix(t, scratch.data(), m.data());
+    solve_lower_transposed(t, s.data() + 7, false);
+    double base[6];
+    solve_lower(t, base, a.data() + offset);
+    for (int k = 0; k < offset; ++k) a[k] = base[k];
+    for (int i = 0; i < nu; ++i) {
+      double sum = 0, size = 0;
+      for (int j = 0; j < nu; ++j)
+        sum += m[i * nu + j] * a[j], size += std::fabs(m[i * nu + j] * a[j]);
+      CHECK_NEAR(sum, i < offset ? 0 : s[7 + i - offset], 1e-11 * (1 + size));
+    }
+  }
+}
