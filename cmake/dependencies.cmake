@@ -1,8 +1,12 @@
-# What the build takes from outside: urdfdom, from the PyPI wheel cmeel-urdfdom. Nothing is taken from the system.
+# Third-party libraries, all from Python wheels; nothing is installed on the system.
 #
-# Python is asked where the wheel lies (-DPython_EXECUTABLE=... chooses the Python). Without the wheel there,
-# CMAKE_PREFIX_PATH is searched. In an isolated pip build the wheel lies in the build environment, and at run time beside the
-# installed package, which is what the install rpath of the Python module says.
+# stickslip_urdfdom: urdfdom, its headers, tinyxml2 and console_bridge from the wheels cmeel-urdfdom[build]. cmeel puts them
+# under <site-packages>/cmeel.prefix. Searched, in this order: STICKSLIP_CMEEL_PREFIX, every entry of CMAKE_PREFIX_PATH
+# (where scikit-build-core lists the site-packages of its isolated build environment), the interpreter's sys.path. Nothing of
+# it is cached: the next isolated environment lies elsewhere. At run time the wheel lies beside the installed package, which
+# is what the install rpath of the Python module says.
+set(STICKSLIP_CMEEL_PREFIX "" CACHE PATH "The cmeel.prefix folder that holds urdfdom; empty: ask the Python interpreter")
+
 set(STICKSLIP_PYTHON_COMPONENTS Interpreter)
 if(STICKSLIP_PYTHON)
   list(APPEND STICKSLIP_PYTHON_COMPONENTS Development.Module)
@@ -13,30 +17,53 @@ if(STICKSLIP_PYTHON)
 endif()
 find_package(Python 3.10 REQUIRED COMPONENTS ${STICKSLIP_PYTHON_COMPONENTS})
 
-execute_process(
-  COMMAND ${Python_EXECUTABLE} -c
-          "from importlib.metadata import distribution as d; print(d('cmeel-urdfdom').locate_file('cmeel.prefix').resolve())"
-  OUTPUT_VARIABLE stickslip_cmeel_prefix OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
+# The folders where a cmeel.prefix may lie, best first.
+function(stickslip_cmeel_candidates result)
+  set(candidates ${STICKSLIP_CMEEL_PREFIX})
+  set(prefixes ${CMAKE_PREFIX_PATH})
+  if(DEFINED ENV{CMAKE_PREFIX_PATH})
+    string(REPLACE ":" ";" from_environment "$ENV{CMAKE_PREFIX_PATH}")
+    list(APPEND prefixes ${from_environment})
+  endif()
+  foreach(prefix IN LISTS prefixes)
+    file(GLOB in_environment "${prefix}/lib/python3*/site-packages/cmeel.prefix")
+    list(APPEND candidates "${prefix}" "${prefix}/cmeel.prefix" ${in_environment})
+  endforeach()
+  execute_process(
+    COMMAND "${Python_EXECUTABLE}" -c "import sys; print(';'.join(p + '/cmeel.prefix' for p in sys.path if p))"
+    OUTPUT_VARIABLE from_python OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
+  list(APPEND candidates ${from_python})
+  set(${result} ${candidates} PARENT_SCOPE)
+endfunction()
 
-set(stickslip_search NO_CMAKE_SYSTEM_PATH NO_SYSTEM_ENVIRONMENT_PATH)
-find_path(STICKSLIP_URDFDOM_INCLUDE urdf_parser/urdf_parser.h HINTS ${stickslip_cmeel_prefix}
-          PATH_SUFFIXES include/urdfdom urdfdom ${stickslip_search})
-find_path(STICKSLIP_URDFDOM_HEADERS_INCLUDE urdf_model/model.h HINTS ${stickslip_cmeel_prefix}
-          PATH_SUFFIXES include/urdfdom_headers urdfdom_headers ${stickslip_search})
-foreach(lib urdfdom_model console_bridge tinyxml2)
-  find_library(STICKSLIP_LIB_${lib} ${lib} HINTS ${stickslip_cmeel_prefix} PATH_SUFFIXES lib ${stickslip_search})
+stickslip_cmeel_candidates(candidates)
+set(cmeel_prefix "")
+foreach(candidate IN LISTS candidates)
+  if(EXISTS "${candidate}/lib/liburdfdom_model.so" AND EXISTS "${candidate}/include/tinyxml2.h"
+     AND EXISTS "${candidate}/include/urdfdom_headers/urdf_model/model.h")
+    set(cmeel_prefix "${candidate}")
+    break()
+  endif()
 endforeach()
-if(NOT STICKSLIP_URDFDOM_INCLUDE OR NOT STICKSLIP_URDFDOM_HEADERS_INCLUDE OR NOT STICKSLIP_LIB_urdfdom_model
-   OR NOT STICKSLIP_LIB_console_bridge OR NOT STICKSLIP_LIB_tinyxml2)
-  message(FATAL_ERROR "urdfdom was not found. Install it for the Python of this build:\n"
-                      "  ${Python_EXECUTABLE} -m pip install 'cmeel-urdfdom[build]'\n"
-                      "or choose a Python that has it with -DPython_EXECUTABLE=...")
+if(NOT cmeel_prefix)
+  list(REMOVE_DUPLICATES candidates)
+  list(JOIN candidates "\n  " candidates)
+  message(FATAL_ERROR
+    "urdfdom was not found. Install it with\n  ${Python_EXECUTABLE} -m pip install 'cmeel-urdfdom[build]'\n"
+    "or pass -DPython_EXECUTABLE=<the interpreter that has it> or -DSTICKSLIP_CMEEL_PREFIX=<its cmeel.prefix>. "
+    "Looked in:\n  ${candidates}")
 endif()
+message(STATUS "urdfdom: ${cmeel_prefix}")
 
-# urdfdom reports through console_bridge; its errors become ours, so both are linked. The imported libraries' full paths give
-# programs of the build tree their rpath: tests run without LD_LIBRARY_PATH.
 add_library(stickslip_urdfdom INTERFACE)
-target_include_directories(stickslip_urdfdom SYSTEM INTERFACE ${STICKSLIP_URDFDOM_INCLUDE} ${STICKSLIP_URDFDOM_INCLUDE}/..
-                           ${STICKSLIP_URDFDOM_HEADERS_INCLUDE})
-target_link_libraries(stickslip_urdfdom INTERFACE ${STICKSLIP_LIB_urdfdom_model} ${STICKSLIP_LIB_console_bridge}
-                      ${STICKSLIP_LIB_tinyxml2})
+foreach(name urdfdom_model tinyxml2 console_bridge)
+  # Imported as shared libraries, so that the build tree gets a run path and tests need no LD_LIBRARY_PATH.
+  add_library(stickslip_${name} SHARED IMPORTED GLOBAL)
+  set_target_properties(stickslip_${name} PROPERTIES IMPORTED_LOCATION "${cmeel_prefix}/lib/lib${name}.so")
+  target_link_libraries(stickslip_urdfdom INTERFACE stickslip_${name})
+endforeach()
+# Copies of what is used: <prefix>/include itself may hold other people's wheels (Boost, Eigen).
+file(COPY "${cmeel_prefix}/include/tinyxml2.h" "${cmeel_prefix}/include/console_bridge"
+  DESTINATION "${CMAKE_BINARY_DIR}/urdfdom_include")
+target_include_directories(stickslip_urdfdom SYSTEM INTERFACE
+  "${CMAKE_BINARY_DIR}/urdfdom_include" "${cmeel_prefix}/include/urdfdom" "${cmeel_prefix}/include/urdfdom_headers")

@@ -64,7 +64,8 @@ struct Shape {
   ShapeType type = ShapeType::kSphere;
   int body = 0;
   Pose pose;                 ///< shape frame in the body frame
-  Vector3 size{0, 0, 0};     ///< box: full side lengths; sphere: {radius}; cylinder, capsule: {radius, length} [m]
+  /// Box: full side lengths; sphere: {radius}; cylinder, capsule: {radius, length}, along z, without the caps [m].
+  Vector3 size{0, 0, 0};
   std::string mesh_file;     ///< mesh: file reference as written in the description
   Vector3 mesh_scale{1, 1, 1};
   std::string material;      ///< contact material; empty: the robot's
@@ -75,6 +76,7 @@ struct Shape {
 /// Generalized position `q`: floating base position (3) [m], base quaternion w x y z (4), joints [rad or m]; a fixed base
 /// has the joints only. Generalized velocity `u`: base linear velocity (3) [m/s] and angular velocity (3) [rad/s], both of the
 /// base origin in world axes, then joint rates. Joints are in depth-first order, siblings by name.
+/// Joints that mimic another in a URDF are independent here, as Pinocchio's are by default; `warnings` names them.
 class Model {
  public:
   const std::string& name() const { return name_; }
@@ -83,6 +85,8 @@ class Model {
   const std::vector<Joint>& joints() const { return joints_; }
   const std::vector<Frame>& frames() const { return frames_; }
   const std::vector<Shape>& shapes() const { return shapes_; }
+  /// What was accepted although it looks wrong, or read but not followed; one sentence each, naming the element.
+  const std::vector<std::string>& warnings() const { return warnings_; }
   int num_joints() const { return static_cast<int>(joints_.size()); }
   int nq() const { return num_joints() + (base_ == BaseType::kFloating ? 7 : 0); }
   int nu() const { return num_joints() + (base_ == BaseType::kFloating ? 6 : 0); }
@@ -101,6 +105,7 @@ class Model {
   std::vector<Joint> joints_;
   std::vector<Frame> frames_;
   std::vector<Shape> shapes_;
+  std::vector<std::string> warnings_;
 };
 
 using ModelPtr = std::shared_ptr<const Model>;

@@ -2,6 +2,7 @@
 #pragma once
 #include <stickslip/model.h>
 
+#include <map>
 #include <optional>
 
 namespace stickslip {
@@ -12,26 +13,41 @@ enum class LinkJointType { kFixed, kRevolute, kContinuous, kPrismatic };
 struct LinkJoint {
   std::string name;
   LinkJointType type = LinkJointType::kFixed;
-  std::string parent;   ///< link name
-  std::string child;    ///< link name
-  Pose pose;            ///< joint frame in the parent link's frame
+  std::string parent;     ///< link name
+  std::string child;      ///< link name
+  Pose pose;              ///< joint frame in the parent link's frame
   Vector3 axis{1, 0, 0};  ///< in the joint frame; normalized on the way in
   double lower, upper, velocity_limit, effort_limit;  ///< [rad or m], [rad/s or m/s], [N m or N]
   double damping = 0, friction = 0;
-  LinkJoint();          ///< limits start infinite
+  LinkJoint();  ///< limits start infinite
 };
 
 /// Collects links, joints and shapes in any order, then checks them all and builds the tree.
 class ModelBuilder {
  public:
+  /// `source` is what errors call the description, a file name for instance.
   explicit ModelBuilder(std::string name, std::string source = "model");
-  /// Adds a link; without an inertial it must end up merged into one that has, or be the root of a fixed-base robot.
+  /// Adds a link; without an inertial it must end up merged into one that has, or into the root of
+  /// a fixed-base robot.
   void add_link(const std::string& name, std::optional<Inertial> inertial = std::nullopt);
   void add_joint(LinkJoint joint);
-  /// Adds a collision shape to a link; `shape.body` is ignored, `shape.pose` is in the link's frame.
+  /// Adds a collision shape to a link; `shape.body` is ignored, `shape.pose` is in the link's
+  /// frame. An empty `shape.name` becomes the link's name and the shape's index there.
   void add_shape(const std::string& link, Shape shape);
-  /// Checks everything (names, one root, no loops, finite numbers, positive masses, positive definite inertias that
-  /// keep the triangle inequality, unit axes, positive sizes), merges fixed joints, orders the tree. Throws ModelError.
+  /// Passed on to `Model::warnings`.
+  void add_warning(std::string text);
+  /// Says where the source speaks of an element, called as in "link 'torso'" or "joint 'knee'";
+  /// errors then name the line.
+  void set_line(const std::string& element, int line);
+  /// Checks names and references only: unique, known, one root, one parent each, no loops. Throws
+  /// ModelError.
+  void check_tree() const;
+  /// Checks everything (names, one root, no loops, finite numbers, positive masses, positive
+  /// definite inertias that keep the triangle inequality, unit axes, positive sizes), merges fixed
+  /// joints, orders the tree. Throws ModelError.
+  ///
+  /// Masses and inertias are judged by what moves: one body with all links that are fixed to it.
+  /// Body 0 of a fixed base needs none. src/model/inertia.h has the tolerances.
   ModelPtr build(BaseType base) const;
 
  private:
@@ -39,10 +55,18 @@ class ModelBuilder {
     std::string name;
     std::optional<Inertial> inertial;
   };
+  [[noreturn]] void fail(const std::string& element, const std::string& what) const;
+  void check_link(const Link& link) const;
+  void check_joint(const LinkJoint& joint) const;
+  void check_shape(const std::string& link, const Shape& shape) const;
+  void merge_inertials(Model& model) const;
+
   std::string name_, source_;
   std::vector<Link> links_;
   std::vector<LinkJoint> joints_;
   std::vector<std::pair<std::string, Shape>> shapes_;
+  std::vector<std::string> warnings_;
+  std::map<std::string, int> lines_;
 };
 
 }  // namespace stickslip
