@@ -1,0 +1,45 @@
+#include "scenes/normal.h"
+
+#include <cmath>
+
+#include "lane/math.h"
+
+namespace stickslip::scenes {
+namespace {
+
+// Finalizer of splitmix64 [Steele 2014]: a good hash of a counter.
+std::uint64_t hash(std::uint64_t k) {
+  std::uint64_t z = (k + 1) * 0x9e3779b97f4a7c15ull;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
+  return z ^ (z >> 31);
+}
+
+// Uniform in (0, 1): 53 random bits, centered so that 0 cannot occur.
+double uniform(std::uint64_t k) { return (static_cast<double>(hash(k) >> 11) + 0.5) * 0x1p-53; }
+
+// ln(x), x > 0: x = m 2^e with m in [sqrt(1/2), sqrt(2)), ln m = 2 atanh((m - 1) / (m + 1)). About
+// 1e-16 of error; libm's last bit differs from machine to machine.
+double logarithm(double x) {
+  int exponent;
+  double m = std::frexp(x, &exponent);
+  if (m < 0.70710678118654752) {
+    m *= 2;
+    --exponent;
+  }
+  const double s = (m - 1) / (m + 1), s2 = s * s;
+  double series = 0;
+  for (int n = 21; n >= 1; n -= 2) series = series * s2 + 1.0 / n;
+  return 2 * s * series + 0.69314718055994531 * exponent;
+}
+
+}  // namespace
+
+double normal(std::uint64_t k) {
+  const std::uint64_t pair = k & ~std::uint64_t{1};
+  double sine, cosine;
+  sincos(6.28318530717958648 * uniform(pair + 1), sine, cosine);
+  return std::sqrt(-2 * logarithm(uniform(pair))) * (k & 1 ? sine : cosine);
+}
+
+}  // namespace stickslip::scenes
