@@ -7,9 +7,9 @@
 #include <stickslip/world.h>
 
 #include <algorithm>
-#include <cstring>
 
 #include "bindings.h"
+#include "words.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -21,14 +21,17 @@ std::size_t dofs(const Robot& robot) { return static_cast<std::size_t>(robot.mod
 
 ArrayOut array3(const Vector3& v) { return copy_array(v); }
 
-/// Steps one by one so that the step at which a robot overflowed is known, without the GIL, and lets Ctrl-C through.
-/// Returns the status bits and the number of steps taken.
+/// Steps one by one so that the step at which a robot overflowed is known, without the GIL, and
+/// lets Ctrl-C through. Returns the status bits and the number of steps taken.
 nb::tuple step(World& world, int steps) {
-  if (steps < 0) throw ModelError("step: steps is " + std::to_string(steps) + ", it must be zero or positive");
+  if (steps < 0)
+    throw ModelError("step: steps is " + std::to_string(steps) + ", it must be zero or positive");
   constexpr int kStepsBetweenSignals = 512;
   std::uint32_t bits = 0;
   int done = 0;
-  const auto overflowed = [&] { return (bits & static_cast<std::uint32_t>(StepStatus::kNonFinite)) != 0; };
+  const auto overflowed = [&] {
+    return (bits & static_cast<std::uint32_t>(StepStatus::kNonFinite)) != 0;
+  };
   while (done < steps && !overflowed()) {
     const int end = std::min(steps, done + kStepsBetweenSignals);
     {
@@ -61,40 +64,34 @@ nb::tuple next_contact_problem(World& world, int robot) {
                         copy_array(problem.friction));
 }
 
-ArrayOut delassus(const Robot& robot, const std::vector<int>& bodies, const std::vector<Vector3>& points) {
+ArrayOut delassus(const Robot& robot, const std::vector<int>& bodies,
+                  const std::vector<Vector3>& points) {
   const std::size_t rows = 3 * points.size();
-  return make_array({rows, rows}, [&](std::span<double> out) { robot.delassus(bodies, points, out); });
+  return make_array({rows, rows},
+                    [&](std::span<double> out) { robot.delassus(bodies, points, out); });
 }
 
-nb::tuple frame_pose(const Robot& robot, const std::string& frame) {
-  const Pose pose = robot.frame_pose(frame);
-  const auto copy = [&](std::span<double> to) { std::copy(pose.rotation.begin(), pose.rotation.end(), to.begin()); };
-  return nb::make_tuple(array3(pose.position), make_array({3, 3}, copy));
-}
-
-void bind_options(nb::module_& m) {
-  nb::enum_<Integrator>(m, "Integrator")
-      .value("energy_safe", Integrator::kEnergySafe)
-      .value("semi_implicit", Integrator::kSemiImplicit);
-  nb::class_<StepSolverOptions>(m, "StepSolverOptions")
-      .def(nb::init<>())
-      .def_rw("method", &StepSolverOptions::method)
-      .def_rw("law", &StepSolverOptions::law)
-      .def_rw("single_contact", &StepSolverOptions::single_contact)
-      .def_rw("tolerance", &StepSolverOptions::tolerance)
-      .def_rw("relative_tolerance", &StepSolverOptions::relative_tolerance)
-      .def_rw("max_sweeps", &StepSolverOptions::max_sweeps)
-      .def_rw("alpha", &StepSolverOptions::alpha)
-      .def_rw("alpha_min", &StepSolverOptions::alpha_min)
-      .def_rw("gamma", &StepSolverOptions::gamma)
-      .def_rw("warm_start", &StepSolverOptions::warm_start);
-  nb::class_<WorldOptions>(m, "WorldOptions")
-      .def(nb::init<>())
-      .def_rw("time_step", &WorldOptions::time_step)
-      .def_rw("gravity", &WorldOptions::gravity)
-      .def_rw("integrator", &WorldOptions::integrator)
-      .def_rw("solver", &WorldOptions::solver)
-      .def_rw("max_substeps", &WorldOptions::max_substeps);
+void init_world(World* self, double time_step, const Vector3& gravity,
+                const std::string& integrator, int max_substeps, const std::string& method,
+                const std::string& law, const std::string& single_contact, double tolerance,
+                double relative_tolerance, int max_sweeps, double alpha, double alpha_min,
+                double gamma, bool warm_start) {
+  WorldOptions options;
+  options.time_step = time_step;
+  options.gravity = gravity;
+  options.integrator = choice("integrator", integrator, kIntegrators);
+  options.max_substeps = max_substeps;
+  options.solver.method = choice("method", method, kSolveMethods);
+  options.solver.law = choice("law", law, kFrictionLaws);
+  options.solver.single_contact = choice("single_contact", single_contact, kSingleContactMethods);
+  options.solver.tolerance = tolerance;
+  options.solver.relative_tolerance = relative_tolerance;
+  options.solver.max_sweeps = max_sweeps;
+  options.solver.alpha = alpha;
+  options.solver.alpha_min = alpha_min;
+  options.solver.gamma = gamma;
+  options.solver.warm_start = warm_start;
+  new (self) World(options);
 }
 
 void bind_records(nb::module_& m) {
@@ -132,14 +129,19 @@ void bind_robot(nb::module_& m) {
       .def_prop_ro("q", [](const Robot& r) { return copy_array(r.q()); })
       .def_prop_ro("u", [](const Robot& r) { return copy_array(r.u()); })
       .def(
-          "set_state", [](Robot& r, const VectorIn& q, const VectorIn& u) { r.set_state(span_of(q), span_of(u)); },
+          "set_state",
+          [](Robot& r, const VectorIn& q, const VectorIn& u) {
+            r.set_state(span_of(q), span_of(u));
+          },
           "q"_a, "u"_a)
       .def_prop_rw(
           "generalized_force", [](const Robot& r) { return copy_array(r.generalized_force()); },
           [](Robot& r, const VectorIn& tau) { r.set_generalized_force(span_of(tau)); })
       .def(
           "set_pd_gains",
-          [](Robot& r, const VectorIn& kp, const VectorIn& kd) { r.set_pd_gains(span_of(kp), span_of(kd)); },
+          [](Robot& r, const VectorIn& kp, const VectorIn& kd) {
+            r.set_pd_gains(span_of(kp), span_of(kd));
+          },
           "kp"_a, "kd"_a)
       .def_prop_ro("pd_kp", [](const Robot& r) { return copy_array(r.pd_kp()); })
       .def_prop_ro("pd_kd", [](const Robot& r) { return copy_array(r.pd_kd()); })
@@ -148,14 +150,18 @@ void bind_robot(nb::module_& m) {
           [](Robot& r, const VectorIn& target) { r.set_pd_target(span_of(target)); })
       .def("mass_matrix",
            [](const Robot& r) {
-             return make_array({dofs(r), dofs(r)}, [&](std::span<double> out) { r.mass_matrix(out); });
+             return make_array({dofs(r), dofs(r)},
+                               [&](std::span<double> out) { r.mass_matrix(out); });
            })
       .def("bias_force",
-           [](const Robot& r) { return make_array({dofs(r)}, [&](std::span<double> out) { r.bias_force(out); }); })
+           [](const Robot& r) {
+             return make_array({dofs(r)}, [&](std::span<double> out) { r.bias_force(out); });
+           })
       .def(
           "forward_dynamics",
           [](const Robot& r, const VectorIn& tau) {
-            return make_array({dofs(r)}, [&](std::span<double> out) { r.forward_dynamics(span_of(tau), out); });
+            return make_array(
+                {dofs(r)}, [&](std::span<double> out) { r.forward_dynamics(span_of(tau), out); });
           },
           "tau"_a)
       .def(
@@ -164,7 +170,7 @@ void bind_robot(nb::module_& m) {
             return make_array({6, dofs(r)}, [&](std::span<double> out) { r.jacobian(frame, out); });
           },
           "frame"_a)
-      .def("frame_pose", &frame_pose, "frame"_a)
+      .def("frame_pose", &Robot::frame_pose, "frame"_a)
       .def("delassus", &delassus, "bodies"_a, "points"_a)
       .def_prop_ro("kinetic_energy", &Robot::kinetic_energy)
       .def_prop_ro("potential_energy", &Robot::potential_energy)
@@ -180,12 +186,16 @@ void bind_robot(nb::module_& m) {
 }  // namespace
 
 void bind_world(nb::module_& m) {
-  bind_options(m);
   bind_records(m);
   bind_robot(m);
   nb::class_<World>(m, "World")
-      .def(nb::init<const WorldOptions&>(), "options"_a)
-      .def_prop_ro("options", [](const World& w) { return w.options(); })
+      .def("__init__", &init_world, "time_step"_a, "gravity"_a, "integrator"_a, "max_substeps"_a,
+           "method"_a, "law"_a, "single_contact"_a, "tolerance"_a, "relative_tolerance"_a,
+           "max_sweeps"_a, "alpha"_a, "alpha_min"_a, "gamma"_a, "warm_start"_a)
+      .def_prop_ro("time_step", [](const World& w) { return w.options().time_step; })
+      .def_prop_ro("gravity", [](const World& w) { return array3(w.options().gravity); })
+      .def_prop_ro("integrator",
+                   [](const World& w) { return word_for(w.options().integrator, kIntegrators); })
       .def("add_ground", &World::add_ground, "height"_a, "material"_a)
       .def(
           "add_robot",
@@ -193,10 +203,12 @@ void bind_world(nb::module_& m) {
              const std::array<double, 4>& orientation, const std::string& material) -> Robot& {
             return w.add_robot(std::move(model), {name, position, orientation, material});
           },
-          "model"_a, "name"_a, "position"_a, "orientation"_a, "material"_a, nb::rv_policy::reference_internal)
+          "model"_a, "name"_a, "position"_a, "orientation"_a, "material"_a,
+          nb::rv_policy::reference_internal)
       .def(
           "set_material_pair",
-          [](World& w, const std::string& a, const std::string& b, double friction, double restitution,
+          [](World& w, const std::string& a, const std::string& b, double friction,
+             double restitution,
              double threshold) { w.set_material_pair(a, b, {friction, restitution, threshold}); },
           "a"_a, "b"_a, "friction"_a, "restitution"_a, "restitution_threshold"_a)
       .def_prop_ro("time", &World::time)

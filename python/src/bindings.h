@@ -15,12 +15,17 @@ void bind_contact(nanobind::module_& m);
 void bind_world(nanobind::module_& m);
 void bind_scenes(nanobind::module_& m);
 
-/// Arrays that come in: contiguous float64. The Python front makes them so; shapes are checked by name there.
-using VectorIn = nanobind::ndarray<const double, nanobind::ndim<1>, nanobind::c_contig, nanobind::device::cpu>;
-/// Arrays that go out: NumPy, owned by Python, never a view of the simulation (which would change under the reader).
+/// Arrays that come in: contiguous float64. The Python front makes them so; shapes are checked by
+/// name there.
+using VectorIn =
+    nanobind::ndarray<const double, nanobind::ndim<1>, nanobind::c_contig, nanobind::device::cpu>;
+/// Arrays that go out: NumPy, owned by Python, never a view of the simulation (which would change
+/// under the reader).
 using ArrayOut = nanobind::ndarray<nanobind::numpy, double, nanobind::c_contig>;
 
-inline std::span<const double> span_of(const VectorIn& array) { return {array.data(), array.size()}; }
+inline std::span<const double> span_of(const VectorIn& array) {
+  return {array.data(), array.size()};
+}
 
 /// A new array of this shape, filled by `fill(std::span<double>)`. Freed also when `fill` throws.
 template <class Fill>
@@ -35,7 +40,8 @@ ArrayOut make_array(std::initializer_list<std::size_t> shape, Fill&& fill) {
 
 /// A copy of a vector.
 inline ArrayOut copy_array(std::span<const double> from) {
-  return make_array({from.size()}, [&](std::span<double> to) { std::copy(from.begin(), from.end(), to.begin()); });
+  return make_array({from.size()},
+                    [&](std::span<double> to) { std::copy(from.begin(), from.end(), to.begin()); });
 }
 
 }  // namespace stickslip::python

@@ -1,4 +1,5 @@
-// The extension module stickslip._core: plain bindings. The documented front is in python/stickslip/*.py.
+// The extension module stickslip._core: plain bindings. The documented front is in
+// python/stickslip/*.py.
 #include <stickslip/errors.h>
 
 #include "bindings.h"
@@ -8,7 +9,7 @@ namespace nb = nanobind;
 NB_MODULE(_core, m) {
   m.doc() = "C++ core of stickslip. Use the names of the package `stickslip`; these may change.";
 
-  // ModelError is a std::invalid_argument, which nanobind turns into a ValueError.
+  nb::exception<stickslip::ModelError>(m, "ModelError", PyExc_ValueError);
   nb::register_exception_translator([](const std::exception_ptr& p, void*) {
     try {
       std::rethrow_exception(p);

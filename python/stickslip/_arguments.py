@@ -1,0 +1,43 @@
+"""Checks of arguments, so that every error names the argument, says what came and what is wanted."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+def number(name: str, value: Any) -> float:
+    """A finite float."""
+    try:
+        result = float(value)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name} is {value!r}; a number is wanted") from None
+    if not np.isfinite(result):
+        raise ValueError(f"{name} is {result}; it must be finite")
+    return result
+
+
+def count(name: str, value: Any) -> int:
+    """An integer, zero or positive."""
+    if isinstance(value, (bool, np.bool_)) or not hasattr(value, "__index__"):
+        raise TypeError(f"{name} is {value!r}; an integer is wanted")
+    if value.__index__() < 0:
+        raise ValueError(f"{name} is {value}; it must be zero or positive")
+    return value.__index__()
+
+
+def array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Finite float64 numbers of this shape, contiguous. May share memory with `value`."""
+    try:
+        result = np.ascontiguousarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise type(error)(f"{name}: not an array of numbers ({error})") from None
+    if np.ndim(value) == 0 or result.shape != shape:
+        raise ValueError(f"{name} has shape {np.shape(value)}; it must be {shape}")
+    bad = np.argwhere(~np.isfinite(result))
+    if len(bad):
+        index = tuple(int(i) for i in bad[0])
+        raise ValueError(f"{name}{list(index)} is {result[index]}; it must be finite")
+    return result

@@ -1,0 +1,514 @@
+"""Worlds: gravity, a ground plane, robots. Double precision, one thread.
+
+A world and its robots belong to one thread at a time; different worlds can step in different threads.
+"""
+
+from __future__ import annotations
+
+import enum
+import os
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stickslip import _core
+from stickslip._arguments import array, count, number
+from stickslip._core import Model, Pose, load_urdf
+from stickslip.contact import ContactProblem
+
+__all__ = ["Contact", "Robot", "SolveInfo", "StageTimes", "StepError", "StepStatus", "World"]
+
+Array = NDArray[np.float64]
+
+_CONTACT_SHAPES = ("sphere", "box")  # what a step finds contacts of; the others are kept in the model
+
+
+class StepStatus(enum.IntFlag):
+    """What a step reports; bits, or-ed over the robots."""
+
+    OK = 0
+    NOT_CONVERGED = 1
+    """Cause: a contact solve stayed above its tolerance. Consequence: the best impulse found was used, see the residual in
+    `solve_info`. Remedy: a smaller step."""
+    NON_FINITE = 2
+    """Cause: forces or velocities overflowed. Consequence: the robot was left in its last finite state; Python raises
+    StepError. Remedy: a smaller step, smaller forces or gains."""
+
+
+class StepError(FloatingPointError):
+    """A robot's velocities overflowed. It was left in its last finite state; `robots` names it."""
+
+    def __init__(self, message: str, robots: list[str]):
+        super().__init__(message)
+        self.robots = robots
+
+
+@dataclass(frozen=True)
+class Contact:
+    """One contact point of the last step (of its last substep, where there were several)."""
+
+    robot: str  #: name of the robot
+    body: str  #: name of its body
+    shape: str  #: name of its shape: the URDF link and the shape's index there, as in "LF_FOOT/0"
+    point: int  #: of the shape; a box has 8 corners
+    position: Array  #: (3,) world [m], at the start of the step
+    normal: Array  #: (3,) world, from the ground to the robot [1]
+    gap: float  #: at the start of the step [m], negative where they overlap
+    friction: float  #: Coulomb's coefficient [1]
+    impulse: Array  #: (3,) on the robot, world axes [N s]
+    velocity: Array  #: (3,) after the impulse, world axes [m/s]
+
+
+@dataclass(frozen=True)
+class SolveInfo:
+    """What the last step did: of one robot, or the sums and worst values over a world."""
+
+    status: StepStatus
+    contacts: int  #: candidates in the solve; a world: of all robots
+    sweeps: int  #: a world: the most of any robot, as are all below
+    newton_steps: int
+    substeps: int
+    residual: float  #: largest contact residual [m/s]
+
+
+@dataclass(frozen=True)
+class StageTimes:
+    """Seconds per stage since `World.reset_stage_times`, counted while `World.set_profiling(True)`."""
+
+    dynamics: float  #: kinematics, bias force, mass matrix factor, free velocity [s]
+    detection: float  #: candidates and gaps [s]
+    delassus: float  #: rows of the contact problem [s]
+    solve: float  #: contact impulses [s]
+    integrate: float  #: final velocity, drift, position correction [s]
+    steps: int
+
+
+def _read_only(values: Array) -> Array:
+    """Marks a copy as one: assigning to its elements would not reach the robot."""
+    values.flags.writeable = False
+    return values
+
+
+class Robot:
+    """A robot in a world; made by `World.add_robot`. Arrays that it returns are copies, read-only where the name can be set."""
+
+    def __init__(self, core: _core.Robot, world: World):
+        self._core = core
+        self._world = world
+        self._model: Model = core.model
+        self._body_names = [body.name for body in self._model.bodies]
+        self._shape_names = [shape.name for shape in self._model.shapes]
+
+    def __repr__(self) -> str:
+        return f"<stickslip.Robot {self.name!r}: {self.nu} degrees of freedom, {self.mass:.4g} kg>"
+
+    @property
+    def name(self) -> str:
+        """Its name in the world."""
+        return self._core.name
+
+    @property
+    def model(self) -> Model:
+        """Its description."""
+        return self._model
+
+    @property
+    def mass(self) -> float:
+        """Of all bodies; of a fixed base, without the base [kg]."""
+        return self._model.mass
+
+    @property
+    def joint_names(self) -> list[str]:
+        """In the order of `q` and `u`."""
+        return self._model.joint_names
+
+    @property
+    def frame_names(self) -> list[str]:
+        """What `jacobian` and `frame_pose` know: every link of the description."""
+        return self._model.frame_names
+
+    @property
+    def nq(self) -> int:
+        """Length of `q`."""
+        return self._model.nq
+
+    @property
+    def nu(self) -> int:
+        """Length of `u`."""
+        return self._model.nu
+
+    @property
+    def num_joints(self) -> int:
+        """Moving joints."""
+        return self._model.num_joints
+
+    # State
+
+    @property
+    def q(self) -> Array:
+        """(nq,) base position [m], base quaternion w x y z, joints [rad or m]; a copy, see `set_state`."""
+        return _read_only(self._core.q)
+
+    @property
+    def u(self) -> Array:
+        """(nu,) base linear [m/s] and angular velocity [rad/s] of the base origin in world axes, joint rates; a copy."""
+        return _read_only(self._core.u)
+
+    def set_state(self, q: ArrayLike, u: ArrayLike) -> None:
+        """Sets position (nq,) and velocity (nu,), and forgets warm-start impulses.
+
+        ValueError for wrong lengths, numbers that are not finite, or a quaternion far from unit length (a near one is
+        normalized).
+        """
+        self._core.set_state(array("q", q, (self.nq,)), array("u", u, (self.nu,)))
+
+    # Control
+
+    @property
+    def generalized_force(self) -> Array:
+        """(nu,) [N, N m], acts until it is set again; assign a whole array."""
+        return _read_only(self._core.generalized_force)
+
+    @generalized_force.setter
+    def generalized_force(self, tau: ArrayLike) -> None:
+        self._core.generalized_force = array("generalized_force", tau, (self.nu,))
+
+    def set_pd_gains(self, kp: ArrayLike, kd: ArrayLike) -> None:
+        """Joint control tau = kp (pd_target - q) - kd u, taken implicitly: no gain is too stiff for the step.
+
+        kp [N m/rad or N/m] and kd [N m s/rad or N s/m]: numbers, or one per joint; zero or positive.
+        """
+        self._core.set_pd_gains(self._per_joint("kp", kp), self._per_joint("kd", kd))
+
+    @property
+    def pd_gains(self) -> tuple[Array, Array]:
+        """kp (num_joints,) and kd (num_joints,)."""
+        return _read_only(self._core.pd_kp), _read_only(self._core.pd_kd)
+
+    @property
+    def pd_target(self) -> Array:
+        """(num_joints,) [rad or m]; assign a whole array."""
+        return _read_only(self._core.pd_target)
+
+    @pd_target.setter
+    def pd_target(self, target: ArrayLike) -> None:
+        self._core.pd_target = array("pd_target", target, (self.num_joints,))
+
+    def _per_joint(self, name: str, value: ArrayLike) -> Array:
+        if np.ndim(value) == 0:
+            return np.full(self.num_joints, number(name, value))
+        return array(name, value, (self.num_joints,))
+
+    # Dynamics at the present state
+
+    def mass_matrix(self) -> Array:
+        """(nu, nu) [kg, kg m, kg m^2]."""
+        return self._core.mass_matrix()
+
+    def bias_force(self) -> Array:
+        """(nu,) h in `M du/dt + h = tau`: gravity, Coriolis and centrifugal forces, without damping and control [N, N m]."""
+        return self._core.bias_force()
+
+    def forward_dynamics(self, tau: ArrayLike) -> Array:
+        """(nu,) acceleration du/dt [m/s^2, rad/s^2] without contacts, for generalized forces tau (nu,) [N, N m]."""
+        return self._core.forward_dynamics(array("tau", tau, (self.nu,)))
+
+    def jacobian(self, frame: str) -> Array:
+        """(6, nu): rows 0-2 give the velocity of the frame's origin, rows 3-5 its angular velocity, in world axes.
+
+        ValueError for an unknown frame lists the names.
+        """
+        return self._core.jacobian(frame)
+
+    def frame_pose(self, frame: str) -> Pose:
+        """Position and rotation of a frame in the world. ValueError for an unknown frame lists the names."""
+        return self._core.frame_pose(frame)
+
+    def delassus(self, bodies: Sequence[str | int], points: ArrayLike) -> Array:
+        """(3n, 3n) J M^-1 J^T [1/kg] of n points (n, 3) [m] in world axes, each fixed to a body given by name or index."""
+        indices = [self._model.body_index(body) if isinstance(body, str) else count("bodies", body) for body in bodies]
+        for index in indices:
+            if index >= len(self._body_names):
+                raise ValueError(f"bodies: {index} is not a body; {self.name} has {len(self._body_names)}")
+        return self._core.delassus(indices, array("points", points, (len(indices), 3)).tolist())
+
+    @property
+    def kinetic_energy(self) -> float:
+        """[J]"""
+        return self._core.kinetic_energy
+
+    @property
+    def potential_energy(self) -> float:
+        """[J], zero at the world's origin."""
+        return self._core.potential_energy
+
+    @property
+    def center_of_mass(self) -> Array:
+        """(3,) world [m]."""
+        return self._core.center_of_mass
+
+    @property
+    def linear_momentum(self) -> Array:
+        """(3,) world [kg m/s]."""
+        return self._core.linear_momentum
+
+    @property
+    def angular_momentum(self) -> Array:
+        """(3,) about the center of mass, world axes [kg m^2/s]."""
+        return self._core.angular_momentum
+
+    # The last step
+
+    @property
+    def contacts(self) -> list[Contact]:
+        """Contact points of the last step."""
+        return [
+            Contact(
+                robot=self.name,
+                body=self._body_names[c.body],
+                shape=self._shape_names[c.shape],
+                point=c.point,
+                position=c.position,
+                normal=c.normal,
+                gap=c.gap,
+                friction=c.friction,
+                impulse=c.impulse,
+                velocity=c.velocity,
+            )
+            for c in self._core.contacts
+        ]
+
+    @property
+    def solve_info(self) -> SolveInfo:
+        """What the last step did for this robot."""
+        i = self._core.info
+        return SolveInfo(StepStatus(i.status), i.contacts, i.sweeps, i.newton_steps, i.substeps, i.residual)
+
+    def next_contact_problem(self) -> ContactProblem:
+        """The contact problem that the next step would solve, for `stickslip.solve`; empty without contacts."""
+        index = self._world.robots.index(self)
+        return ContactProblem(*self._world._core.next_contact_problem(index))
+
+
+class World:
+    """One scene.
+
+    time_step: [s]
+    gravity: (3,) [m/s^2]
+    integrator: "energy_safe" neither sinks nor explodes at large steps; "semi_implicit" is the paper's scheme (a contact is
+        active when its gap is negative, no correction of positions).
+    method: how contact impulses are found, "auto", "per_contact" ([Hwangbo 2018] Algorithm 2) or "pgs".
+    law: "coulomb" (friction opposite to sliding) or "max_dissipation" ([Hwangbo 2018] eq. 8).
+    single_contact: "halley", "bisection", "golden_section" or "quartic"; for "per_contact".
+    tolerance: on the largest contact residual [m/s]; relative_tolerance: part of the largest contact speed, "auto" only.
+    max_sweeps, alpha, alpha_min, gamma: of "per_contact" (and alpha of "pgs"), as in `stickslip.solve`.
+    warm_start: start each solve at the last step's impulses.
+    max_substeps: "energy_safe" cuts a step into at most this many parts when bodies turn fast.
+
+    ValueError names the option that is out of range.
+    """
+
+    def __init__(
+        self,
+        time_step: float = 1e-3,
+        gravity: ArrayLike = (0.0, 0.0, -9.81),
+        *,
+        integrator: str = "energy_safe",
+        method: str = "auto",
+        law: str = "coulomb",
+        single_contact: str = "halley",
+        tolerance: float = 1e-9,
+        relative_tolerance: float = 1e-8,
+        max_sweeps: int = 100_000,
+        alpha: float = 1.0,
+        alpha_min: float = 0.7,
+        gamma: float = 0.99,
+        warm_start: bool = True,
+        max_substeps: int = 8,
+    ):
+        self._core = _core.World(
+            time_step=number("time_step", time_step),
+            gravity=array("gravity", gravity, (3,)).tolist(),
+            integrator=integrator,
+            max_substeps=count("max_substeps", max_substeps),
+            method=method,
+            law=law,
+            single_contact=single_contact,
+            tolerance=number("tolerance", tolerance),
+            relative_tolerance=number("relative_tolerance", relative_tolerance),
+            max_sweeps=count("max_sweeps", max_sweeps),
+            alpha=number("alpha", alpha),
+            alpha_min=number("alpha_min", alpha_min),
+            gamma=number("gamma", gamma),
+            warm_start=bool(warm_start),
+        )
+        self._robots: list[Robot] = []
+
+    def __repr__(self) -> str:
+        robots = ", ".join(robot.name for robot in self._robots) or "no robots"
+        return f"<stickslip.World at {self.time:.6g} s: {robots}>"
+
+    # Building
+
+    def add_ground(self, height: float = 0.0, material: str = "default") -> None:
+        """A horizontal plane that fills everything below z = height [m]; one per world."""
+        self._core.add_ground(number("height", height), material)
+
+    def add_robot(
+        self,
+        robot: str | os.PathLike[str] | Model,
+        *,
+        position: ArrayLike = (0.0, 0.0, 0.0),
+        orientation: ArrayLike = (1.0, 0.0, 0.0, 0.0),
+        base: str | None = None,
+        name: str = "",
+        material: str = "default",
+    ) -> Robot:
+        """Adds a robot, joints at zero, from a URDF file or a `Model`.
+
+        position: (3,) of the base [m]; orientation: (4,) quaternion w x y z of the base (normalized); both of a fixed base too.
+        base: "floating" (default for a file) or "fixed"; a `Model` has its own.
+        name: empty for the model's name, made unique. material: of its shapes, see `set_material_pair`.
+
+        FileNotFoundError or ValueError names the file, the element or the argument; the world is then as before. A UserWarning
+        names what is not simulated as described, shapes that take part in no contact among it.
+        """
+        place = array("position", position, (3,)).tolist()
+        turn = array("orientation", orientation, (4,)).tolist()
+        model = _model(robot, base)
+        _warn(model)  # before the world changes: a warning may be turned into an error
+        core = self._core.add_robot(model, name, place, turn, material)
+        self._robots.append(Robot(core, self))
+        return self._robots[-1]
+
+    def set_material_pair(
+        self, a: str, b: str, *, friction: float = 0.8, restitution: float = 0.0, restitution_threshold: float = 0.0
+    ) -> None:
+        """Sets how two materials meet (in either order), now and for what is added later.
+
+        friction: Coulomb's coefficient [1], >= 0. restitution: Newton's, 0 to 1 [1]. restitution_threshold: approach speed
+        below which a contact does not bounce [m/s]. Pairs that were never set have the defaults.
+        """
+        self._core.set_material_pair(
+            a,
+            b,
+            number("friction", friction),
+            number("restitution", restitution),
+            number("restitution_threshold", restitution_threshold),
+        )
+
+    # Running
+
+    @property
+    def robots(self) -> list[Robot]:
+        """In the order in which they were added."""
+        return list(self._robots)
+
+    @property
+    def time(self) -> float:
+        """[s]"""
+        return self._core.time
+
+    @property
+    def time_step(self) -> float:
+        """[s]"""
+        return self._core.time_step
+
+    @property
+    def gravity(self) -> Array:
+        """(3,) [m/s^2]"""
+        return self._core.gravity
+
+    @property
+    def integrator(self) -> str:
+        """ "energy_safe" or "semi_implicit"."""
+        return self._core.integrator
+
+    def step(self, steps: int = 1) -> StepStatus:
+        """Advances every robot by `steps` time steps; returns the status bits of all of them, or-ed.
+
+        StepError when a robot's velocities overflow: the stepping ends there, `time` says where.
+        """
+        bits, done = self._core.step(count("steps", steps))
+        status = StepStatus(bits)
+        if StepStatus.NON_FINITE in status:
+            names = [robot.name for robot in self._robots if StepStatus.NON_FINITE in robot.solve_info.status]
+            raise StepError(
+                f"{', '.join(names)}: forces or velocities overflowed in step {done} of {steps} (time {self.time:.6g} s) "
+                "and the robot was left in its last finite state; use a smaller step, or smaller forces or gains",
+                names,
+            )
+        return status
+
+    @property
+    def contacts(self) -> list[Contact]:
+        """Contact points of the last step, of all robots."""
+        return [contact for robot in self._robots for contact in robot.contacts]
+
+    @property
+    def solve_info(self) -> SolveInfo:
+        """What the last step did: status bits or-ed, contacts summed, the largest of everything else."""
+        infos = [robot.solve_info for robot in self._robots]
+        status = StepStatus.OK
+        for info in infos:
+            status |= info.status
+        return SolveInfo(
+            status=status,
+            contacts=sum(info.contacts for info in infos),
+            sweeps=max((info.sweeps for info in infos), default=0),
+            newton_steps=max((info.newton_steps for info in infos), default=0),
+            substeps=max((info.substeps for info in infos), default=1),
+            residual=max((info.residual for info in infos), default=0.0),
+        )
+
+    def save_state(self) -> bytes:
+        """Everything that changes in a step; `load_state` replays bit for bit. Forces, gains and targets are not in it."""
+        return self._core.save_state()
+
+    def load_state(self, blob: bytes) -> None:
+        """Goes back to a saved state. ValueError if it is not of a world with the same robots; nothing changes then."""
+        if not isinstance(blob, (bytes, bytearray, memoryview)):
+            raise TypeError(f"blob is a {type(blob).__name__}; bytes from save_state are wanted")
+        self._core.load_state(bytes(blob))
+
+    # Measuring
+
+    def set_profiling(self, on: bool) -> None:
+        """Counts the time of each stage of a step (a little slower)."""
+        self._core.set_profiling(bool(on))
+
+    @property
+    def stage_times(self) -> StageTimes:
+        """Time per stage since the last reset."""
+        t = self._core.stage_times
+        return StageTimes(t.dynamics, t.detection, t.delassus, t.solve, t.integrate, t.steps)
+
+    def reset_stage_times(self) -> None:
+        """Starts counting from zero."""
+        self._core.reset_stage_times()
+
+
+def _model(robot: str | os.PathLike[str] | Model, base: str | None) -> Model:
+    if isinstance(robot, Model):
+        if base not in (None, robot.base):
+            raise ValueError(f"base is {base!r}, but the model {robot.name!r} was made with base={robot.base!r}")
+        return robot
+    if not isinstance(robot, (str, os.PathLike)):
+        raise TypeError(f"robot is a {type(robot).__name__}; a path to a URDF file or a Model is wanted")
+    return load_urdf(robot, base="floating" if base is None else base)
+
+
+def _warn(model: Model) -> None:
+    """Says what of a model is not simulated as described."""
+    silent = [f"{shape.name} ({shape.type})" for shape in model.shapes if shape.type not in _CONTACT_SHAPES]
+    messages = [f"{model.name}: {message}" for message in model.warnings]
+    if silent:
+        shown = ", ".join(silent[:6]) + (f" and {len(silent) - 6} more" if len(silent) > 6 else "")
+        messages.append(
+            f"{model.name}: these collision shapes take part in no contact, only spheres and boxes do so far: {shown}"
+        )
+    for message in messages:
+        warnings.warn(message, UserWarning, stacklevel=3)

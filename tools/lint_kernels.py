@@ -1,0 +1,85 @@
+#!/usr/bin/env python3
+"""Checks the kernel rules that a grep can see (docs/design: one source for double, SIMD lanes and GPU threads).
+
+Kernel headers hold only our own arithmetic: no standard library, no libm, no Eigen, no approximate reciprocals, no
+exceptions, no allocation. Source files beside them may use the standard library, but nothing that makes bits depend on the
+machine or the run. Prints `file:line: what (why)` and exits 1 when it finds something.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+KERNEL_FOLDERS = ("lane", "spatial", "dynamics", "collide", "contact", "step", "backend")
+
+# Headers for the host side: they size memory and read models, no kernel calls into them.
+HOST_HEADERS = {
+    "dynamics/tree_layout.h",
+    "dynamics/tree_memory.h",
+}
+# Compiler headers with vector instructions, only where the pack is made of them.
+INTRINSICS = {"lane/pack.h": ("immintrin.h", "arm_neon.h")}
+
+LIBM = "sin|cos|tan|asin|acos|atan|atan2|sincos|sinh|cosh|tanh|exp|exp2|expm1|log|log2|log10|log1p|pow|cbrt|hypot"
+
+# (pattern, why); matched outside comments and strings.
+EVERYWHERE = [
+    (rf"\bstd::({LIBM}|fma)\b", "libm differs between machines; use lane/math.h"),
+    (r"\bEigen\b", "Eigen is for loading and tests"),
+    (r"rsqrt|rcp(14|28)?_p[sd]|vrecpe|vrsqrte|\b__fdividef\b", "approximate reciprocals differ between processors"),
+    (r"fast-math|fast_math|fp-contract|FP_CONTRACT|associative-math", "the compiler may not choose the rounding"),
+    (r"\bunordered_(map|set|multimap|multiset)\b", "its order is not part of any contract"),
+    (r"\bstd::(random_device|mt19937|uniform_\w+_distribution|normal_distribution)\b", "no randomness in a step"),
+    (r"\bstd::(reduce|transform_reduce)\b|\bstd::execution\b", "its order of operations is free"),
+]
+KERNEL = [
+    (r"\bstd::", "kernel headers use no standard library"),
+    (rf"\b__builtin_({LIBM})f?\b", "libm differs between machines; use lane/math.h"),
+    (r"\b(throw|try|catch)\b", "no exceptions in a kernel"),
+    (r"\b(new|delete|malloc|free)\b", "no allocation in a kernel"),
+    (r"\b(virtual|dynamic_cast|typeid)\b", "no run-time types in a kernel"),
+    (r"\b(long double|__float128)\b", "not a lane type"),
+]
+
+
+def without_comments(text: str) -> str:
+    """The text with comments and strings blanked, lines kept."""
+
+    def blank(match: re.Match[str]) -> str:
+        return re.sub(r"[^\n]", " ", match[0])
+
+    return re.sub(r"//[^\n]*|/\*.*?\*/|(?<!include )\"(?:\\.|[^\"\\\n])*\"", blank, text, flags=re.S)
+
+
+def findings(path: Path, name: str) -> list[str]:
+    """What breaks a rule in the file that is called `name` below src."""
+    kernel = path.suffix in (".h", ".inl") and name not in HOST_HEADERS
+    rules = EVERYWHERE + (KERNEL if kernel else [])
+    result = []
+    for number, line in enumerate(without_comments(path.read_text(encoding="utf-8")).splitlines(), 1):
+        include = re.match(r"\s*#\s*include\s*<([^>]+)>", line)
+        if kernel and include and include[1] not in INTRINSICS.get(name, ()):
+            result.append(f"{path}:{number}: #include <{include[1]}> (kernel headers include only our own headers)")
+        for pattern, why in rules:
+            if found := re.search(pattern, line):
+                result.append(f"{path}:{number}: {found[0].strip()} ({why})")
+    return result
+
+
+def main() -> int:
+    source = Path(__file__).resolve().parent.parent / "src"
+    files = sorted(
+        path
+        for folder in KERNEL_FOLDERS
+        for path in (source / folder).rglob("*")
+        if path.suffix in (".h", ".inl", ".cc", ".cu")
+    )
+    found = [line for path in files for line in findings(path, path.relative_to(source).as_posix())]
+    print("\n".join(found) if found else f"kernel rules: {len(files)} files, nothing found")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
