@@ -1,0 +1,218 @@
+// The default solver of a step, `auto`: warm-started sweeps, Newton finish on the shared dofs,
+// fallback, certificate (docs/theory/contact.md (C20)-(C38)). Never fails to return: the best
+// impulse found, its residual, and whether it is good enough.
+//
+// Rule between sweeps and Newton steps, per lane: with e_k the largest velocity change of sweep k,
+// sweep again while e_k^2 / e_(k-1) <= tolerance (the next sweep is then expected to converge),
+// else take a Newton step. Maximum dissipation ([Hwangbo 2018] eq. 8) is not a complementarity
+// problem in the velocity, so the Newton finish and the fallback do not apply: it sweeps to the
+// end, and its residual is |G_ii (lambda_i - local_i)|.
+#pragma once
+#include "contact/fallback.h"
+
+namespace stickslip::contact {
+
+struct FactoredOptions {
+  bool max_dissipation = false;
+  double tolerance_absolute = 1e-9;  ///< stop: velocity change of a sweep [m/s] ...
+  double tolerance_relative = 1e-8;  ///< ... plus this much of the largest free contact velocity
+  double residual_tolerance = 1e-8;  ///< converged: largest residual at most this [m/s]
+  double residual_relative =
+      0;  ///< ... plus this much of the largest free contact velocity (float needs it)
+  double alpha = 1e-6;       ///< proximal weight of a Newton step ...
+  double alpha_late = 1e-5;  ///< ... and after six of them
+  int max_sweeps = 10;  ///< before the fallback; maximum dissipation takes up to 100 times as many
+  bool fallback = true;
+};
+
+/// Options that suit the precision of S.
+template <class S>
+FactoredOptions default_options() {
+  FactoredOptions o;
+  if (sizeof(Value<S>) == 4) {
+    o.tolerance_absolute = 1e-6;
+    o.tolerance_relative = 1e-5;
+    o.residual_tolerance = 1e-5;
+    o.residual_relative = 3e-5;
+    o.alpha = 2e-5;
+    o.alpha_late = 2e-3;
+  }
+  return o;
+}
+
+template <class S>
+struct FactoredInfo {
+  S residual;         // largest of the contacts [m/s]
+  Mask<S> converged;  // residual within tolerance; false where an input is not finite (then the
+                      // impulses are zero)
+  int sweeps = 0;     // of the slowest lane
+  int newton_steps = 0;
+  int fallbacks = 0;  // lanes that needed it
+  int fallback_steps = 0;
+};
+
+/// Largest squared residual of the contacts; writes their velocities.
+template <int M, bool kMaxDissipation, class S>
+STICKSLIP_INLINE S certify(FactoredProblem<S>& p) {
+  S worst = constant<S>(0), sum = constant<S>(0);
+  for (int i = 0; i < p.size(); ++i) {
+    FactoredContact<S>& c = p.contact(i);
+    S l[3], e;
+    contact_velocity<M>(c, p.w, c.velocity);
+    store(c.lambda, l);
+    if constexpr (kMaxDissipation) {
+      S free[3], best[3], d[3];
+      int evaluations;
+      apply_block(c.local, l, free);
+      for (int r = 0; r < 3; ++r) free[r] = c.velocity[r] - free[r];
+      solve_halley<true>(c.local, free, sizeof(Value<S>) == 4 ? 1e-6 : 1e-13, best, evaluations);
+      for (int r = 0; r < 3; ++r) best[r] = l[r] - best[r];
+      apply_block(c.local, best, d);
+      e = madd(d[0], d[0], madd(d[1], d[1], d[2] * d[2]));
+    } else {
+      e = natural_map_residual_squared(c.local, c.velocity, l);
+    }
+    worst = max(worst, e);
+    sum = sum + e;
+  }
+  return madd(constant<S>(0), sum, worst);  // NaN if any is
+}
+
+/// Sweeps and Newton steps until the change is small in every lane; returns the lanes that are
+/// still above.
+template <int M, bool kMaxDissipation, class S>
+STICKSLIP_INLINE Mask<S> iterate(FactoredProblem<S>& p, Mask<S> live, S tolerance_squared,
+                                 const FactoredOptions& o, FactoredInfo<S>& info) {
+  const S speed = constant<S>(0.1) * sqrt(tolerance_squared);
+  S before = constant<S>(1e30);
+  const int cap = kMaxDissipation ? 100 * o.max_sweeps : o.max_sweeps;
+  for (int k = 1;; ++k) {
+    const S change = sweep<M, kMaxDissipation>(p, live, speed);
+    live = live & (change > tolerance_squared);
+    ++info.sweeps;
+    if (!any(live) || k >= cap) return live;
+    if (!kMaxDissipation && k >= 2) {
+      const bool late = k >= 5;
+      const auto slow = late ? live : live & (change * change > tolerance_squared * before);
+      if (any(slow)) {
+        newton_step<M>(p, slow, constant<S>(k < 8 ? o.alpha : o.alpha_late));
+        ++info.newton_steps;
+      }
+    }
+    before = change;
+  }
+}
+
+/// One lane of a pack (or a float problem) as a double problem.
+template <class S>
+void extract_lane(const FactoredProblem<S>& p, int lane, FactoredProblem<double>& q) {
+  q.clear(p.dofs());
+  for (int k = 0; k < p.dofs(); ++k) q.w0[k] = get_lane(p.w0[k], lane);
+  for (int i = 0; i < p.size(); ++i) {
+    const FactoredContact<S>& c = p.contact(i);
+    const int j = q.add();
+    if (!p.six()) q.set_index(j, c.index, c.count);
+    for (int k = 0; k < (p.six() ? 6 : c.count); ++k) {
+      S y[3];
+      store(c.y[k], y);
+      q.y(j)[k] = make_row3(double(get_lane(y[0], lane)), double(get_lane(y[1], lane)),
+                            double(get_lane(y[2], lane)));
+    }
+    S l[3];
+    store(c.lambda, l);
+    for (int r = 0; r < 3; ++r) {
+      q.offset(j)[r] = get_lane(c.offset[r], lane);
+      q.impulse(j)[r] = get_lane(l[r], lane);
+    }
+    for (int r = 0; r < 6; ++r) q.private_block(j)[r] = get_lane(c.private_block[r], lane);
+    q.friction(j) = get_lane(c.friction, lane);
+  }
+}
+
+template <int M, class S>
+__attribute__((noinline)) void run_fallback(FactoredProblem<S>& p, Mask<S> lanes, S tolerance,
+                                            FactoredInfo<S>& info) {
+  for (int l = 0; l < ScalarTraits<S>::kWidth; ++l) {
+    if (!get_lane(lanes, l)) continue;
+    ++info.fallbacks;
+    if constexpr (ScalarTraits<S>::kWidth == 1 && sizeof(S) == 8) {
+      Fallback<M> fallback(p, tolerance);
+      fallback.run();
+      info.fallback_steps += fallback.steps();
+    } else {
+      FactoredProblem<double>& q = *p.lane;
+      extract_lane(p, l, q);
+      for (int i = 0; i < q.size(); ++i) {
+        q.complete(i);
+        prepare_contact<M>(q.contact(i));
+      }
+      Fallback<M> fallback(q, double(get_lane(tolerance, l)));
+      fallback.run();
+      info.fallback_steps += fallback.steps();
+      for (int i = 0; i < q.size(); ++i) {
+        double from[3];
+        S to[3];
+        store(q.contact(i).lambda, from);
+        store(p.contact(i).lambda, to);
+        for (int r = 0; r < 3; ++r) set_lane(to[r], l, Value<S>(from[r]));
+        set_impulse(p.contact(i), to);
+      }
+      // Only this lane's w is rebuilt.
+      for (int k = 0; k < p.dofs(); ++k) set_lane(p.w[k], l, Value<S>(q.w[k]));
+    }
+  }
+}
+
+template <int M, bool kMaxDissipation, class S>
+void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, FactoredInfo<S>& info) {
+  const S zero = constant<S>(0);
+  S fastest = zero, sum = zero;
+  for (int i = 0; i < p.size(); ++i) {
+    FactoredContact<S>& c = p.contact(i);
+    p.complete(i);
+    prepare_contact<M>(c);
+    S v[3];
+    store(add_rows<M>(c, p.w0, make_row3(c.offset[0], c.offset[1], c.offset[2])), v);
+    const S square = madd(v[0], v[0], madd(v[1], v[1], v[2] * v[2]));
+    fastest = max(fastest, square);
+    sum = sum + (square + c.local.scale + abs(c.impulse[0]) + abs(c.impulse[1]) + c.impulse[2]);
+  }
+  accumulate<M>(p);
+  const S relative = constant<S>(o.tolerance_relative),
+          absolute = constant<S>(o.tolerance_absolute);
+  const S tolerance_squared = madd(relative * relative, fastest, absolute * absolute);
+  const S allowed =
+      madd(constant<S>(o.residual_relative), sqrt(fastest), constant<S>(o.residual_tolerance));
+  const auto finite = sum < constant<S>(1e30);  // false for NaN
+  auto open = iterate<M, kMaxDissipation>(p, finite, tolerance_squared, o, info);
+  S worst = certify<M, kMaxDissipation>(p);
+  auto bad = finite & !(worst <= allowed * allowed);
+  if (!kMaxDissipation && o.fallback && any(bad)) {
+    run_fallback<M>(p, bad, allowed * constant<S>(0.9), info);
+    worst = certify<M, kMaxDissipation>(p);
+  }
+  (void)open;
+  info.residual = sqrt(worst);
+  info.converged = finite & (worst <= allowed * allowed);
+  for (int i = 0; i < p.size(); ++i) {
+    FactoredContact<S>& c = p.contact(i);
+    store(c.lambda, c.impulse);
+    for (S& x : c.impulse) x = select(finite, x, zero);
+  }
+  if (any(!finite))
+    for (int k = 0; k < p.dofs(); ++k) p.w[k] = select(finite, p.w[k], p.w0[k]);
+}
+
+/// Solves the problem in place: impulse(i), velocity(i) and w hold the answer.
+template <class S>
+FactoredInfo<S> solve_factored(FactoredProblem<S>& p,
+                               const FactoredOptions& o = default_options<S>()) {
+  FactoredInfo<S> info;
+  if (o.max_dissipation)
+    p.six() ? solve_factored_as<6, true>(p, o, info) : solve_factored_as<0, true>(p, o, info);
+  else
+    p.six() ? solve_factored_as<6, false>(p, o, info) : solve_factored_as<0, false>(p, o, info);
+  return info;
+}
+
+}  // namespace stickslip::contact

@@ -1,0 +1,287 @@
+// Contacts that couple only through a few shared dofs, and the memory of their solve
+// (docs/theory/contact.md (C20)-(C24)).
+//
+//   v_i = c0_i + Y_i w + P_i lambda_i,   w = w0 + sum_j Y_j^T lambda_j,   G_ii = Y_i Y_i^T + P_i
+// Used terms: w shared vector (m); Y_i rows of contact i on the shared dofs it touches; P_i its
+// private part (dofs of a branch that no other contact touches) [1/kg]; c0_i offset velocity [m/s].
+// No off-diagonal Delassus block is ever formed.
+//
+// Layout: rows are kept twice, as columns of three (velocity: 3 rows at once) and transposed in
+// chunks (update of w: a chunk of dofs at once). For a plain scalar a chunk is a 4-lane pack, for a
+// pack it is one dof: either way each number goes through the same operations in the same order, so
+// a lane of a pack has the bits of the plain scalar.
+#pragma once
+#include "contact/residual.h"
+#include "lane/row3.h"
+
+namespace stickslip::contact {
+
+/// Shared dofs handled by one operation.
+template <class S, bool kPlain = ScalarTraits<S>::kWidth == 1>
+struct ChunkOf {
+  using Type = S;
+  static constexpr int kSize = 1;
+};
+template <class S>
+struct ChunkOf<S, true> {
+  using Type = Pack<S, 4>;
+  static constexpr int kSize = 4;
+};
+template <class S>
+using Chunk = typename ChunkOf<S>::Type;
+template <class S>
+inline constexpr int kChunk = ChunkOf<S>::kSize;
+
+template <class S>
+STICKSLIP_INLINE Chunk<S> load_chunk(const S* p) {
+  Chunk<S> c;
+  __builtin_memcpy(&c, p, sizeof c);
+  return c;
+}
+template <class S>
+STICKSLIP_INLINE void store_chunk(S* p, const Chunk<S>& c) {
+  __builtin_memcpy(p, &c, sizeof c);
+}
+template <class S>
+STICKSLIP_INLINE Chunk<S> madd_chunk(const Chunk<S>& a, S b, const Chunk<S>& c) {
+  if constexpr (ScalarTraits<S>::kWidth == 1)
+    return madd(a, Chunk<S>(b), c);
+  else
+    return madd(a, b, c);
+}
+constexpr int round_up(int n, int k) { return (n + k - 1) / k * k; }
+
+/// One contact of a factored problem. The owner fills the inputs; `prepare_contact` the rest.
+template <class S>
+struct FactoredContact {
+  // Inputs.
+  S friction;          // mu [1]
+  S private_block[6];  // P: xx, xy, xz, yy, yz, zz [1/kg]
+  S offset[3];         // c0 [m/s]
+  S impulse[3];        // in: warm start, out: solution [N s]
+  Mask<S> active;      // false in lanes that do not have this contact
+  int count;           // shared dofs it touches
+  int* index;          // which ones, ascending
+  Row3<S>* y;          // column k: the three rows at dof index[k] [1/sqrt(kg)]
+  // Output.
+  S velocity[3];  // v_i [m/s]
+  // Derived.
+  LocalContact<S> local;
+  S shared[6];  // Y Y^T
+  Row3<S> shared_columns[3];
+  Row3<S> inverse[3];  // columns of G_ii^-1 (from S^-1): the stick impulse is -G_ii^-1 c
+  Row3<S> base;        // c0 - (Y Y^T) lambda: velocity without own impulse is base + Y w
+  Row3<S> lambda;
+  S direction[2];  // unit direction of the last slip impulse, or zero
+  int chunks;
+  int* chunk_start;  // dof of a chunk's first lane
+  Chunk<S>* yt;  // (3, chunks): transposed rows, zero where a chunk reaches past the touched dofs
+  // Newton step.
+  Row3<S> n_columns[3];  // N, eliminated response of the contact
+  S n_offset[3];
+};
+
+/// Sizes of a workspace: how many contacts and shared dofs it can hold.
+struct FactoredCapacity {
+  int contacts = 0;
+  int dofs = 0;
+};
+
+/// Bump allocation over a block that the owner hands over; with no block it only counts.
+class Arena {
+ public:
+  explicit Arena(void* memory) : base_(static_cast<char*>(memory)) {}
+  template <class T>
+  T* take(long n) {
+    used_ = (used_ + 63) / 64 * 64;
+    T* p = reinterpret_cast<T*>(base_ + used_);
+    used_ += n * long(sizeof(T));
+    return base_ ? p : nullptr;
+  }
+  long used() const { return used_ + 64; }
+
+ private:
+  char* base_;
+  long used_ = 0;
+};
+
+/// A factored problem and everything its solve needs. Memory is attached once; nothing allocates
+/// afterwards.
+template <class S>
+class FactoredProblem {
+ public:
+  /// Bytes that `attach` needs. The block must be aligned to 64.
+  static long required_bytes(FactoredCapacity capacity) {
+    FactoredProblem p;
+    return p.lay_out(nullptr, capacity);
+  }
+  void attach(void* memory, FactoredCapacity capacity) { lay_out(memory, capacity); }
+
+  /// Starts a new problem with m shared dofs and w0 = 0.
+  void clear(int m) {
+    n_ = 0;
+    m_ = m;
+    identity_ = true;
+    for (int k = 0; k < padded(m); ++k) w0[k] = constant<S>(0);
+  }
+  /// Adds a contact that touches all shared dofs, without private part, offset, or warm start;
+  /// returns its number.
+  int add() {
+    FactoredContact<S>& c = contacts_[n_];
+    const S zero = constant<S>(0);
+    c.friction = zero;
+    for (S& x : c.private_block) x = zero;
+    for (int r = 0; r < 3; ++r) c.offset[r] = c.impulse[r] = zero;
+    c.active = !(zero < zero);
+    c.count = -1;
+    return n_++;
+  }
+  /// The contact touches only these shared dofs (ascending); its rows are then y(i)[k] at dof
+  /// index[k].
+  void set_index(int i, const int* index, int count) {
+    contacts_[i].count = count;
+    for (int k = 0; k < count; ++k) contacts_[i].index[k] = index[k];
+    identity_ = false;
+  }
+
+  /// Fills in the index list of a contact that touches all shared dofs.
+  void complete(int i) {
+    FactoredContact<S>& c = contacts_[i];
+    if (c.count >= 0) return;
+    c.count = m_;
+    if (!six())
+      for (int k = 0; k < m_; ++k) c.index[k] = k;
+  }
+
+  Row3<S>* y(int i) { return contacts_[i].y; }
+  S* private_block(int i) { return contacts_[i].private_block; }
+  S* offset(int i) { return contacts_[i].offset; }
+  S& friction(int i) { return contacts_[i].friction; }
+  S* impulse(int i) { return contacts_[i].impulse; }
+  Mask<S>& active(int i) { return contacts_[i].active; }
+  const S* velocity(int i) const { return contacts_[i].velocity; }
+  FactoredContact<S>& contact(int i) { return contacts_[i]; }
+  const FactoredContact<S>& contact(int i) const { return contacts_[i]; }
+
+  int size() const { return n_; }
+  int dofs() const { return m_; }
+  /// Every contact touches all of exactly six dofs (one floating base): the unrolled case.
+  bool six() const { return identity_ && m_ == 6; }
+  FactoredCapacity capacity() const { return capacity_; }
+  static int padded(int m) { return round_up(m + 1, 4) + 4; }
+  int stride() const { return padded(m_); }
+
+  S* w0 = nullptr;       // (m) in
+  S* w = nullptr;        // (m) out
+  S* matrix = nullptr;   // (m, stride): I + sum Y^T N Y, right-hand side in column m
+  S* scratch = nullptr;  // (3, stride)
+  S* saved = nullptr;    // (5, n, 3) impulses kept by the fallback
+  FactoredProblem<double>* lane =
+      nullptr;  // where the fallback solves one lane of a pack, or a float problem
+
+ private:
+  long lay_out(void* memory, FactoredCapacity capacity) {
+    Arena arena(memory);
+    capacity_ = capacity;
+    const int n = capacity.contacts, m = capacity.dofs, wide = padded(m);
+    contacts_ = arena.take<FactoredContact<S>>(n);
+    w0 = arena.take<S>(wide);
+    w = arena.take<S>(wide);
+    matrix = arena.take<S>(long(m) * wide + 8);
+    scratch = arena.take<S>(3 * wide);
+    saved = arena.take<S>(15 * n);
+    for (int i = 0; i < n; ++i) {
+      int* index = arena.take<int>(m);
+      int* start = arena.take<int>(m);
+      Row3<S>* y = arena.take<Row3<S>>(m);
+      Chunk<S>* yt = arena.take<Chunk<S>>(3 * m);
+      if (memory) {
+        contacts_[i].index = index;
+        contacts_[i].chunk_start = start;
+        contacts_[i].y = y;
+        contacts_[i].yt = yt;
+      }
+    }
+    if constexpr (!kIsDouble) {
+      lane = arena.template take<FactoredProblem<double>>(1);
+      const long inner = FactoredProblem<double>::required_bytes(capacity);
+      char* block = arena.template take<char>(inner + 64);
+      if (memory) lane->attach(block, capacity);
+    }
+    return arena.used();
+  }
+  static constexpr bool kIsDouble = ScalarTraits<S>::kWidth == 1 && sizeof(S) == 8;
+
+  FactoredContact<S>* contacts_ = nullptr;
+  FactoredCapacity capacity_;
+  int n_ = 0, m_ = 0;
+  bool identity_ = true;
+};
+
+/// Y w of a contact on top of `start`: even and odd dofs in two chains, which halves the latency. M
+/// = 6: all six dofs, unrolled; M = 0: by index.
+template <int M, class S>
+STICKSLIP_INLINE Row3<S> add_rows(const FactoredContact<S>& c, const S* w, const Row3<S>& start) {
+  if constexpr (M == 6) {
+    Row3<S> a = madd(c.y[0], w[0], start), b = c.y[1] * w[1];
+    a = madd(c.y[2], w[2], a), b = madd(c.y[3], w[3], b);
+    a = madd(c.y[4], w[4], a), b = madd(c.y[5], w[5], b);
+    return a + b;
+  } else {
+    const S zero = constant<S>(0);
+    Row3<S> a = start, b = make_row3(zero, zero, zero);
+    for (int k = 0; k + 1 < c.count; k += 2) {
+      a = madd(c.y[k], w[c.index[k]], a);
+      b = madd(c.y[k + 1], w[c.index[k + 1]], b);
+    }
+    if (c.count & 1) a = madd(c.y[c.count - 1], w[c.index[c.count - 1]], a);
+    return a + b;
+  }
+}
+
+/// target += Y^T d.
+template <int M, class S>
+STICKSLIP_INLINE void add_transposed(const FactoredContact<S>& c, const S d[3], S* target) {
+  constexpr int kFixed = M == 6 ? round_up(6, kChunk<S>) / kChunk<S> : 0;
+  const int chunks = M == 6 ? kFixed : c.chunks;
+  for (int j = 0; j < chunks; ++j) {
+    S* t = target + (M == 6 ? j * kChunk<S> : c.chunk_start[j]);
+    Chunk<S> v = load_chunk(t);
+    for (int r = 0; r < 3; ++r) v = madd_chunk<S>(c.yt[r * chunks + j], d[r], v);
+    store_chunk(t, v);
+  }
+}
+
+/// v_i = c0 + Y w + P lambda.
+template <int M, class S>
+STICKSLIP_INLINE void contact_velocity(const FactoredContact<S>& c, const S* w, S v[3]) {
+  S l[3];
+  store(c.lambda, l);
+  const S* p = c.private_block;
+  Row3<S> x = make_row3(c.offset[0], c.offset[1], c.offset[2]);
+  x = madd(make_row3(p[0], p[1], p[2]), l[0], x);
+  x = madd(make_row3(p[1], p[3], p[4]), l[1], x);
+  x = madd(make_row3(p[2], p[4], p[5]), l[2], x);
+  store(add_rows<M>(c, w, x), v);
+}
+
+/// base = c0 - (Y Y^T) lambda, after an impulse changed.
+template <class S>
+STICKSLIP_INLINE void update_base(FactoredContact<S>& c, const S l[3]) {
+  Row3<S> x = make_row3(c.offset[0], c.offset[1], c.offset[2]);
+  for (int r = 0; r < 3; ++r) x = nmadd(c.shared_columns[r], l[r], x);
+  c.base = x;
+}
+
+/// Unit direction of the tangential impulse, zero if there is none: where the next slip solve
+/// starts.
+template <class S>
+STICKSLIP_INLINE void reset_direction(FactoredContact<S>& c, const S l[3]) {
+  const S zero = constant<S>(0), one = constant<S>(1), square = madd(l[0], l[0], l[1] * l[1]);
+  const auto some = square > constant<S>(sizeof(Value<S>) == 4 ? 1e-30 : 1e-100);
+  const S inv = select(some, one / sqrt(select(some, square, one)), zero);
+  c.direction[0] = l[0] * inv;
+  c.direction[1] = l[1] * inv;
+}
+
+}  // namespace stickslip::contact

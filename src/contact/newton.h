@@ -1,0 +1,227 @@
+// Newton finish of a factored problem: one semismooth Newton step on the Alart-Curnier map with a
+// proximal term, eliminated to the m shared dofs (docs/theory/contact.md (C30)-(C34)).
+//
+// Per contact, in velocity units (scale = trace G_ii / 3), u its velocity, t = scale lambda_T -
+// u_T, s = scale lambda_z - u_z:
+//   F_z = u_z,  F_T = u_T (stick, |t| <= mu s)  or  scale lambda_T - mu s e, e = t / |t| (slip);
+//   lambda = 0 where s <= 0 A dlambda + B du = -F,   du = (P + alpha scale I) dlambda + Y dw   =>
+//   dlambda = -(g + N Y dw)
+// With dw = sum Y^T dlambda this leaves (I + sum Y^T N Y) dw = -sum Y^T g: one m x m elimination
+// instead of 3n x 3n.
+#pragma once
+#include "contact/sweep.h"
+
+namespace stickslip::contact {
+
+/// What one contact brings into the step, and its elimination. T is S, or a pack of contacts of a
+/// plain scalar.
+template <class T>
+struct NewtonBlock {
+  T block[6];  // P, private part
+  T mu, scale;
+  T lambda[3];
+  T u[3];  // contact velocity, with the proximal shift
+  T n[9];  // out: N, row-major
+  T g[3];  // out
+};
+
+template <class T>
+STICKSLIP_INLINE void eliminate(NewtonBlock<T>& b, T alpha) {
+  const T zero = constant<T>(0), one = constant<T>(1),
+          tiny = constant<T>(sizeof(Value<T>) == 4 ? 1e-30 : 1e-200);
+  const T s = madd(b.scale, b.lambda[2], -b.u[2]);
+  const T t0 = madd(b.scale, b.lambda[0], -b.u[0]), t1 = madd(b.scale, b.lambda[1], -b.u[1]);
+  const T norm = sqrt(madd(t0, t0, t1 * t1)), limit = b.mu * max(s, zero);
+  const auto on = s > zero;
+  const auto stick = norm <= limit;
+  const T inv = one / max(norm, tiny), e0 = t0 * inv, e1 = t1 * inv, ratio = min(limit * inv, one);
+  const T q00 = ratio * nmadd(e0, e0, one), q01 = -(ratio * (e0 * e1)),
+          q11 = ratio * nmadd(e1, e1, one);
+  const T m0 = b.mu * e0, m1 = b.mu * e1;
+  // B = [b00 b01 b02; b01 b11 b12; 0 0 1], A only in the tangential rows.
+  const T b00 = select(stick, one, q00), b01 = select(stick, zero, q01),
+          b11 = select(stick, one, q11);
+  const T b02 = select(stick, zero, m0), b12 = select(stick, zero, m1);
+  const T f0 = select(stick, b.u[0], nmadd(limit, e0, b.scale * b.lambda[0]));
+  const T f1 = select(stick, b.u[1], nmadd(limit, e1, b.scale * b.lambda[1]));
+  const T f2 = b.u[2];
+  const T prox = alpha * b.scale, *p = b.block;
+  const T dxx = p[0] + prox, dyy = p[3] + prox, dzz = p[5] + prox;
+  // C = A + B D.
+  const T c00 =
+      madd(b00, dxx, madd(b01, p[1], madd(b02, p[2], select(stick, zero, (one - q00) * b.scale))));
+  const T c01 =
+      madd(b00, p[1], madd(b01, dyy, madd(b02, p[4], select(stick, zero, -(q01 * b.scale)))));
+  const T c02 =
+      madd(b00, p[2], madd(b01, p[4], madd(b02, dzz, select(stick, zero, -(m0 * b.scale)))));
+  const T c10 =
+      madd(b01, dxx, madd(b11, p[1], madd(b12, p[2], select(stick, zero, -(q01 * b.scale)))));
+  const T c11 =
+      madd(b01, p[1], madd(b11, dyy, madd(b12, p[4], select(stick, zero, (one - q11) * b.scale))));
+  const T c12 =
+      madd(b01, p[2], madd(b11, p[4], madd(b12, dzz, select(stick, zero, -(m1 * b.scale)))));
+  const T c20 = p[2], c21 = p[4], c22 = dzz;
+  // Inverse by cofactors.
+  const T j00 = nmadd(c12, c21, c11 * c22), j01 = nmadd(c01, c22, c02 * c21),
+          j02 = nmadd(c02, c11, c01 * c12);
+  const T j10 = nmadd(c10, c22, c12 * c20), j11 = nmadd(c02, c20, c00 * c22),
+          j12 = nmadd(c00, c12, c02 * c10);
+  const T j20 = nmadd(c11, c20, c10 * c21), j21 = nmadd(c00, c21, c01 * c20),
+          j22 = nmadd(c01, c10, c00 * c11);
+  const T det = madd(c00, j00, madd(c01, j10, c02 * j20));
+  const T r = select(on, one / select(abs(det) > tiny, det, tiny), zero);
+  const T rows[3][3] = {
+      {j00 * r, j01 * r, j02 * r}, {j10 * r, j11 * r, j12 * r}, {j20 * r, j21 * r, j22 * r}};
+  for (int i = 0; i < 3; ++i) {
+    const T *j = rows[i], g = madd(j[0], f0, madd(j[1], f1, j[2] * f2));
+    b.g[i] = select(on, g, b.lambda[i]);
+    b.n[3 * i] = madd(j[0], b00, j[1] * b01);
+    b.n[3 * i + 1] = madd(j[0], b01, j[1] * b11);
+    b.n[3 * i + 2] = madd(j[0], b02, madd(j[1], b12, j[2]));
+  }
+}
+
+/// Elimination of all contacts, four at a time for a plain scalar: each contact's numbers are the
+/// same either way. `center`: proximal center (n, 3), or null where it is the present impulse.
+template <int M, class S>
+STICKSLIP_INLINE void eliminate_contacts(FactoredProblem<S>& p, S alpha, const S* center) {
+  constexpr int kLanes = ScalarTraits<S>::kWidth == 1 ? 4 : 1;
+  using T = Chunk<S>;
+  const int n = p.size();
+  for (int first = 0; first < n; first += kLanes) {
+    NewtonBlock<T> b;
+    for (int l = 0; l < kLanes; ++l) {
+      const int i = first + l < n ? first + l : first;  // the last pack is filled with copies
+      const FactoredContact<S>& c = p.contact(i);
+      S v[3], lambda[3];
+      contact_velocity<M>(c, p.w, v);
+      store(c.lambda, lambda);
+      if (center)
+        for (int r = 0; r < 3; ++r)
+          v[r] = madd(alpha * c.local.scale, lambda[r] - center[3 * i + r], v[r]);
+      S* out = reinterpret_cast<S*>(&b) + l;
+      for (int r = 0; r < 6; ++r) out[r * kLanes] = c.private_block[r];
+      out[6 * kLanes] = c.local.mu;
+      out[7 * kLanes] = c.local.scale;
+      for (int r = 0; r < 3; ++r) out[(8 + r) * kLanes] = lambda[r], out[(11 + r) * kLanes] = v[r];
+    }
+    eliminate(b, T(alpha));
+    for (int l = 0; l < kLanes && first + l < n; ++l) {
+      FactoredContact<S>& c = p.contact(first + l);
+      const S* out = reinterpret_cast<const S*>(&b) + l;
+      const auto at = [out](int r) { return out[r * kLanes]; };
+      for (int j = 0; j < 3; ++j) c.n_columns[j] = make_row3(at(14 + j), at(17 + j), at(20 + j));
+      for (int r = 0; r < 3; ++r) c.n_offset[r] = at(23 + r);
+    }
+  }
+}
+
+/// matrix = I + sum Y^T N Y, its column m = -sum Y^T g.
+template <int M, class S>
+STICKSLIP_INLINE void assemble(FactoredProblem<S>& p) {
+  const S zero = constant<S>(0), one = constant<S>(1);
+  const int m = M ? M : p.dofs(), stride = M ? FactoredProblem<S>::padded(M) : p.stride();
+  S *h = p.matrix, *t = p.scratch, g[M ? FactoredProblem<S>::padded(M ? M : 1) : 1];
+  S* rhs = M ? g : p.scratch + 2 * stride;
+  for (int i = 0; i < m * stride; ++i) h[i] = zero;
+  for (int i = 0; i < stride; ++i) rhs[i] = zero;
+  for (int i = 0; i < m; ++i) h[i * stride + i] = one;
+  for (int i = 0; i < p.size(); ++i) {
+    const FactoredContact<S>& c = p.contact(i);
+    const int count = M ? M : c.count, chunks = M ? round_up(M, kChunk<S>) / kChunk<S> : c.chunks;
+    S n[3][3];
+    for (int j = 0; j < 3; ++j) store(c.n_columns[j], n[j]);
+    S minus[3] = {-c.n_offset[0], -c.n_offset[1], -c.n_offset[2]};
+    add_transposed<M>(c, minus, rhs);
+    for (int r = 0; r < 3; ++r) {
+      // Column r of Y^T N, over the shared dofs of the contact.
+      for (int j = 0; j < chunks; ++j) {
+        const int start = M ? j * kChunk<S> : c.chunk_start[j];
+        Chunk<S> x = c.yt[j] * Chunk<S>(n[r][0]);
+        x = madd_chunk<S>(c.yt[chunks + j], n[r][1], x);
+        x = madd_chunk<S>(c.yt[2 * chunks + j], n[r][2], x);
+        store_chunk(t + start, x);
+      }
+      for (int k = 0; k < count; ++k) {
+        const int row = M ? k : c.index[k];
+        for (int q = 0; q < chunks; ++q) {
+          S* to = h + row * stride + (M ? q * kChunk<S> : c.chunk_start[q]);
+          store_chunk(to, madd_chunk<S>(c.yt[r * chunks + q], t[row], load_chunk(to)));
+        }
+      }
+    }
+  }
+  for (int i = 0; i < m; ++i) h[i * stride + m] = rhs[i];
+}
+
+/// Solves matrix x = column m by elimination without pivoting (the identity and N make the diagonal
+/// dominate in practice; a breakdown shows as a huge or non-finite x, which the caller rejects). x
+/// is left in p.scratch.
+template <int M, class S>
+STICKSLIP_INLINE S* solve_shared(FactoredProblem<S>& p) {
+  const S one = constant<S>(1), zero = constant<S>(0), tiny = constant<S>(1e-30);
+  const int m = M ? M : p.dofs(), stride = M ? FactoredProblem<S>::padded(M) : p.stride();
+  S *h = p.matrix, *x = p.scratch;
+  for (int j = 0; j < m; ++j) {
+    const S* pivot = h + j * stride;
+    const S d = pivot[j], inv = one / select(abs(d) > tiny, d, tiny);
+    for (int i = j + 1; i < m; ++i) {
+      S* row = h + i * stride;
+      const S f = row[j] * inv;
+      for (int k = j / kChunk<S> * kChunk<S>; k <= m; k += kChunk<S>)
+        store_chunk(row + k, madd_chunk<S>(load_chunk(pivot + k), -f, load_chunk(row + k)));
+    }
+    h[j * stride + j] = inv;
+  }
+  for (int i = 0; i < m; ++i) x[i] = h[i * stride + m];
+  for (int i = m; i < stride; ++i) x[i] = zero;
+  for (int i = m - 1; i >= 0; --i) {
+    x[i] = x[i] * h[i * stride + i];
+    for (int k = 0; k < i; ++k) x[k] = nmadd(h[k * stride + i], x[i], x[k]);
+  }
+  return x;
+}
+
+/// One guarded Newton step on the lanes `live`: impulses return to the cone (normal kept), w
+/// follows. A lane whose step is not finite or above 1e6 keeps its impulses: float lanes do meet a
+/// broken pivot.
+template <int M, class S>
+STICKSLIP_INLINE void newton_step(FactoredProblem<S>& p, Mask<S> live, S alpha) {
+  const S zero = constant<S>(0), one = constant<S>(1), huge = constant<S>(1e6);
+  eliminate_contacts<M>(p, alpha, static_cast<const S*>(nullptr));
+  assemble<M>(p);
+  const S* x = solve_shared<M>(p);
+  S size = zero;
+  for (int k = 0; k < (M ? M : p.dofs()); ++k) size = size + abs(x[k]);
+  const auto sane = live & (size < huge);
+  const Row3<S> none = make_row3(zero, zero, zero);
+  for (int i = 0; i < p.size(); ++i) {
+    FactoredContact<S>& c = p.contact(i);
+    S dv[3], response[3], old[3], l[3];
+    store(add_rows<M>(c, x, none), dv);
+    store(madd(c.n_columns[2], dv[2], madd(c.n_columns[1], dv[1], c.n_columns[0] * dv[0])),
+          response);
+    store(c.lambda, old);
+    for (int r = 0; r < 3; ++r) l[r] = old[r] - (c.n_offset[r] + response[r]);
+    l[2] = max(l[2], zero);
+    const S square = madd(l[0], l[0], l[1] * l[1]), limit = c.local.mu * l[2];
+    const auto some = square > constant<S>(sizeof(Value<S>) == 4 ? 1e-30 : 1e-100);
+    const S inv = select(some, one / sqrt(select(some, square, one)), zero);
+    const auto outside = square > limit * limit;
+    const S ex = l[0] * inv, ey = l[1] * inv;
+    l[0] = select(outside, ex * limit, l[0]);
+    l[1] = select(outside, ey * limit, l[1]);
+    const auto take = sane & ((abs(l[0]) + abs(l[1]) + l[2]) < huge);
+    S d[3];
+    for (int r = 0; r < 3; ++r) {
+      l[r] = select(take, l[r], old[r]);
+      d[r] = l[r] - old[r];
+    }
+    c.direction[0] = select(take, ex, c.direction[0]);
+    c.direction[1] = select(take, ey, c.direction[1]);
+    set_impulse(c, l);
+    add_transposed<M>(c, d, p.w);
+  }
+}
+
+}  // namespace stickslip::contact

@@ -1,0 +1,206 @@
+// Block Gauss-Seidel over a factored problem: one visit solves one contact with the others held
+// ([Hwangbo 2018] Algorithm 2 with alpha = 1), in the space of the shared dofs
+// (docs/theory/contact.md (C20)-(C24)).
+//
+//   c = c0 + Y w - (Y Y^T) lambda;   lambda' = local(c);   w += Y^T (lambda' - lambda)
+// A visit costs 45 multiplications however many contacts there are; the slip solve takes one Halley
+// step from the last direction, since the sweep will come back. What bounds the speed of one robot
+// is the latency of the chain w -> c -> lambda -> w, so everything that does not lie on it (the
+// base velocity, the basis of the slip step) is kept ready.
+#pragma once
+#include "contact/factored_problem.h"
+#include "contact/halley.h"
+
+namespace stickslip::contact {
+
+/// Transposed rows in chunks, from the rows.
+template <int M, class S>
+STICKSLIP_INLINE void transpose_rows(FactoredContact<S>& c) {
+  if constexpr (ScalarTraits<S>::kWidth > 1) {
+    const int n = M == 6 ? 6 : c.count;
+    c.chunks = n;
+    for (int k = 0; k < n; ++k) {
+      c.chunk_start[k] = M == 6 ? k : c.index[k];
+      c.yt[k] = c.y[k].x;
+      c.yt[n + k] = c.y[k].y;
+      c.yt[2 * n + k] = c.y[k].z;
+    }
+  } else if constexpr (M == 6) {
+    using V = typename Chunk<S>::Vector;
+    c.chunks = 2;
+    const V a = c.y[0].v.v, b = c.y[1].v.v, d = c.y[2].v.v, e = c.y[3].v.v, f = c.y[4].v.v,
+            g = c.y[5].v.v;
+    const V ab = __builtin_shufflevector(a, b, 0, 4, 2, 6),
+            abh = __builtin_shufflevector(a, b, 1, 5, 3, 7);
+    const V de = __builtin_shufflevector(d, e, 0, 4, 2, 6),
+            deh = __builtin_shufflevector(d, e, 1, 5, 3, 7);
+    const V zero = {}, fg = __builtin_shufflevector(f, g, 0, 4, 2, 6),
+            fgh = __builtin_shufflevector(f, g, 1, 5, 3, 7);
+    c.yt[0] = __builtin_shufflevector(ab, de, 0, 1, 4, 5);
+    c.yt[1] = __builtin_shufflevector(fg, zero, 0, 1, 4, 5);
+    c.yt[2] = __builtin_shufflevector(abh, deh, 0, 1, 4, 5);
+    c.yt[3] = __builtin_shufflevector(fgh, zero, 0, 1, 4, 5);
+    c.yt[4] = __builtin_shufflevector(ab, de, 2, 3, 6, 7);
+    c.yt[5] = __builtin_shufflevector(fg, zero, 2, 3, 6, 7);
+  } else {
+    int chunks = 0;
+    for (int k = 0; k < c.count; ++chunks) {
+      c.chunk_start[chunks] = c.index[k];
+      while (k < c.count && c.index[k] < c.chunk_start[chunks] + 4) ++k;
+    }
+    c.chunks = chunks;
+    for (int r = 0; r < 3; ++r)
+      for (int j = 0, k = 0; j < chunks; ++j) {
+        S lanes[4] = {};
+        for (; k < c.count && c.index[k] < c.chunk_start[j] + 4; ++k)
+          lanes[c.index[k] - c.chunk_start[j]] = c.y[k].v.v[r];
+        c.yt[r * chunks + j] = load_chunk(lanes);
+      }
+  }
+}
+
+/// In lanes that do not have the contact it is replaced by one that is always open and moves
+/// nothing.
+template <class S>
+STICKSLIP_INLINE void clear_inactive(FactoredContact<S>& c) {
+  if constexpr (ScalarTraits<S>::kWidth > 1) {
+    const S zero = constant<S>(0), one = constant<S>(1);
+    for (int k = 0; k < c.count; ++k) {
+      c.y[k].x = select(c.active, c.y[k].x, zero);
+      c.y[k].y = select(c.active, c.y[k].y, zero);
+      c.y[k].z = select(c.active, c.y[k].z, zero);
+    }
+    for (int i = 0; i < 6; ++i)
+      c.private_block[i] =
+          select(c.active, c.private_block[i], i == 0 || i == 3 || i == 5 ? one : zero);
+    for (int r = 0; r < 3; ++r) {
+      c.offset[r] = select(c.active, c.offset[r], r == 2 ? one : zero);
+      c.impulse[r] = select(c.active, c.impulse[r], zero);
+    }
+    c.friction = select(c.active, c.friction, zero);
+  }
+}
+
+/// Blocks of one contact from its rows, and its warm start (brought back into the cone).
+template <int M, class S>
+STICKSLIP_INLINE void prepare_contact(FactoredContact<S>& c) {
+  const S zero = constant<S>(0), one = constant<S>(1);
+  clear_inactive(c);
+  transpose_rows<M>(c);
+  const int n = M == 6 ? 6 : c.count;
+  Row3<S> d[3];
+  for (int r = 0; r < 3; ++r) d[r] = make_row3(zero, zero, zero);
+  for (int k = 0; k < n; ++k) {
+    S y[3];
+    store(c.y[k], y);
+    for (int r = 0; r < 3; ++r) d[r] = madd(c.y[k], y[r], d[r]);
+  }
+  S column[3][3];
+  for (int r = 0; r < 3; ++r) {
+    c.shared_columns[r] = d[r];
+    store(d[r], column[r]);
+  }
+  const S shared[6] = {column[0][0], column[0][1], column[0][2],
+                       column[1][1], column[1][2], column[2][2]};
+  for (int i = 0; i < 6; ++i) c.shared[i] = shared[i];
+  LocalContact<S>& k = c.local;
+  const S* p = c.private_block;
+  k.xx = shared[0] + p[0], k.xy = shared[1] + p[1], k.xz = shared[2] + p[2];
+  k.yy = shared[3] + p[3], k.yz = shared[4] + p[4], k.zz = shared[5] + p[5];
+  k.mu = c.friction;
+  prepare(k);
+  // G^-1 = [S^-1, -S^-1 w; ., 1/G_zz + w^T S^-1 w]: one product of columns on the latency chain of
+  // a sticking visit.
+  const S ux = madd(k.ixx, k.wx, k.ixy * k.wy), uy = madd(k.ixy, k.wx, k.iyy * k.wy);
+  c.inverse[0] = make_row3(k.ixx, k.ixy, -ux);
+  c.inverse[1] = make_row3(k.ixy, k.iyy, -uy);
+  c.inverse[2] = make_row3(-ux, -uy, madd(k.wx, ux, madd(k.wy, uy, k.inv_zz)));
+  // Warm start.
+  S* l = c.impulse;
+  l[2] = max(l[2], zero);
+  const S limit = k.mu * l[2], square = madd(l[0], l[0], l[1] * l[1]);
+  const auto outside = square > limit * limit;
+  if (any(outside)) {
+    const S f = select(outside, limit / sqrt(select(outside, square, one)), one);
+    l[0] = l[0] * f, l[1] = l[1] * f;
+  }
+  c.lambda = make_row3(l[0], l[1], l[2]);
+  reset_direction(c, l);
+  update_base(c, l);
+}
+
+/// Visits one contact; only lanes in `live` change. Returns the squared velocity change,
+/// |dlambda|^2 (trace G_ii / 3)^2.
+template <int M, bool kMaxDissipation, class S>
+STICKSLIP_INLINE S visit(FactoredContact<S>& c, S* w, Mask<S> live, S speed) {
+  const S zero = constant<S>(0);
+  const LocalContact<S>& k = c.local;
+  const Row3<S> velocity = add_rows<M>(c, w, c.base);
+  S v[3], old[3];
+  store(velocity, v);
+  store(c.lambda, old);
+  const auto closing = (v[2] < zero) & (k.inv_zz > zero);
+  if (!any(live & (closing | (old[2] > zero)))) return zero;
+  S next[3];
+  if (any(closing)) {
+    Row3<S> stop = c.inverse[0] * v[0];
+    stop = madd(c.inverse[1], v[1], stop);
+    stop = madd(c.inverse[2], v[2], stop);
+    store(stop, next);
+    for (int r = 0; r < 3; ++r) next[r] = -next[r];
+    Reduced<S> r;
+    r.x = next[0], r.y = next[1], r.z = next[2];
+    const S limit = k.mu * r.z;
+    const auto inside = (r.z >= zero) & (madd(r.x, r.x, r.y * r.y) <= limit * limit);
+    r.stick = closing & inside;
+    r.slip = closing & !inside & live;
+    if (any(r.slip)) {
+      r.a = -v[2] * k.inv_zz;
+      r.bx = madd(k.xz, r.a, v[0]);
+      r.by = madd(k.yz, r.a, v[1]);
+      visit_slip<kMaxDissipation>(k, r, speed, c.direction, next);
+    }
+    for (int i = 0; i < 3; ++i) next[i] = select(closing, next[i], zero);
+  } else {
+    for (int i = 0; i < 3; ++i) next[i] = zero;
+  }
+  S d[3];
+  for (int i = 0; i < 3; ++i) {
+    next[i] = select(live, next[i], old[i]);
+    d[i] = next[i] - old[i];
+  }
+  add_transposed<M>(c, d, w);
+  c.lambda = make_row3(next[0], next[1], next[2]);
+  update_base(c, next);
+  return madd(d[0], d[0], madd(d[1], d[1], d[2] * d[2])) * (k.scale * k.scale);
+}
+
+/// One sweep over all contacts in their order; the largest squared velocity change per lane
+/// [m^2/s^2].
+template <int M, bool kMaxDissipation, class S>
+STICKSLIP_INLINE S sweep(FactoredProblem<S>& p, Mask<S> live, S speed) {
+  S change = constant<S>(0);
+  for (int i = 0; i < p.size(); ++i)
+    change = max(change, visit<M, kMaxDissipation>(p.contact(i), p.w, live, speed));
+  return change;
+}
+
+/// w = w0 + sum Y^T lambda.
+template <int M, class S>
+STICKSLIP_INLINE void accumulate(FactoredProblem<S>& p) {
+  for (int k = 0; k < p.stride(); k += kChunk<S>) store_chunk(p.w + k, load_chunk(p.w0 + k));
+  for (int i = 0; i < p.size(); ++i) {
+    S l[3];
+    store(p.contact(i).lambda, l);
+    add_transposed<M>(p.contact(i), l, p.w);
+  }
+}
+
+/// Puts impulses in place without touching w (`accumulate` follows).
+template <class S>
+STICKSLIP_INLINE void set_impulse(FactoredContact<S>& c, const S l[3]) {
+  c.lambda = make_row3(l[0], l[1], l[2]);
+  update_base(c, l);
+}
+
+}  // namespace stickslip::contact
