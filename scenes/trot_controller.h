@@ -20,7 +20,7 @@ struct TrotOptions {
   double swing_fraction = 0.48;  ///< share of the stride a leg is in the air, below 0.5 [1]
   double clearance = 0.07;       ///< height of the foot in mid swing [m]
   double height = 0.48;          ///< of the base origin above the ground [m]
-  double foothold_x = 0.34, foothold_y = 0.235;  ///< of the neutral foothold from the base [m]
+  double foothold_x = 0.31, foothold_y = 0.235;  ///< of the neutral foothold from the base [m]
   double foothold_gain = 0.06;                   ///< foothold shift per speed error [s]
   double friction = 0.6;     ///< cone that stance forces are kept in, below the real one [1]
   double torque_limit = 80;  ///< [N m]
