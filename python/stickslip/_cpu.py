@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import platform
+from pathlib import Path
 
 # One fused multiply-add per `madd` is part of the promise of equal bits, so there is no slower fallback.
 _WANTED = ("avx2", "fma", "bmi2")
+_CPUINFO = Path("/proc/cpuinfo")
 
 
 def check() -> None:
@@ -13,7 +15,7 @@ def check() -> None:
     if platform.machine() not in ("x86_64", "AMD64"):
         return
     try:
-        with open("/proc/cpuinfo", encoding="ascii", errors="replace") as lines:
+        with _CPUINFO.open(encoding="ascii", errors="replace") as lines:
             flags = next((line.split() for line in lines if line.startswith("flags")), None)
     except OSError:
         return
