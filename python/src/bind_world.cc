@@ -9,6 +9,7 @@
 #include <algorithm>
 
 #include "bindings.h"
+#include "collide/ground_shapes.h"
 #include "words.h"
 
 namespace nb = nanobind;
@@ -188,6 +189,8 @@ void bind_robot(nb::module_& m) {
 void bind_world(nb::module_& m) {
   bind_records(m);
   bind_robot(m);
+  m.def("unsupported_shapes", &collide::unsupported_shapes, "model"_a,
+        "Indices of shapes that no contact is computed for.");
   nb::class_<World>(m, "World")
       .def("__init__", &init_world, "time_step"_a, "gravity"_a, "integrator"_a, "max_substeps"_a,
            "method"_a, "law"_a, "single_contact"_a, "tolerance"_a, "relative_tolerance"_a,

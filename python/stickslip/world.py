@@ -23,8 +23,6 @@ __all__ = ["Contact", "Robot", "SolveInfo", "StageTimes", "StepError", "StepStat
 
 Array = NDArray[np.float64]
 
-_CONTACT_SHAPES = ("sphere", "box")  # what a step finds contacts of; the others are kept in the model
-
 
 class StepStatus(enum.IntFlag):
     """What a step reports; bits, or-ed over the robots."""
@@ -503,12 +501,13 @@ def _model(robot: str | os.PathLike[str] | Model, base: str | None) -> Model:
 
 def _warn(model: Model) -> None:
     """Says what of a model is not simulated as described."""
-    silent = [f"{shape.name} ({shape.type})" for shape in model.shapes if shape.type not in _CONTACT_SHAPES]
+    shapes = model.shapes
+    silent = [f"{shapes[i].name} ({shapes[i].type})" for i in _core.unsupported_shapes(model)]
     messages = [f"{model.name}: {message}" for message in model.warnings]
     if silent:
         shown = ", ".join(silent[:6]) + (f" and {len(silent) - 6} more" if len(silent) > 6 else "")
         messages.append(
-            f"{model.name}: these collision shapes take part in no contact, only spheres and boxes do so far: {shown}"
+            f"{model.name}: these collision shapes take part in no contact, meshes are not supported yet: {shown}"
         )
     for message in messages:
         warnings.warn(message, UserWarning, stacklevel=3)

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 import stickslip as ss
 from robots import example_robots
 

@@ -7,6 +7,7 @@ import warnings
 
 import numpy as np
 import pytest
+
 import stickslip as ss
 
 MESH = """

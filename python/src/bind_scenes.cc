@@ -1,0 +1,115 @@
+// The tasks of scenes/, run in C++ loops. The documented front is python/stickslip/scenes.py.
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+#include <stickslip/world.h>
+
+#include <algorithm>
+
+#include "bindings.h"
+#include "scenes/statistics.h"
+#include "scenes/tasks.h"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+
+namespace stickslip::python {
+namespace {
+
+using scenes::Statistics;
+using scenes::Task;
+
+std::vector<std::string> task_names() {
+  std::vector<std::string> names;
+  for (const scenes::TaskSpec& spec : scenes::task_specs()) names.push_back(spec.name);
+  return names;
+}
+
+nb::tuple initial_state(const std::string& task, int episode) {
+  ArrayOut q = make_array({7 + scenes::kNumJoints}, [](std::span<double>) {});
+  ArrayOut u = make_array({6 + scenes::kNumJoints}, [](std::span<double>) {});
+  scenes::initial_state(scenes::task_spec(task).kind, episode, {q.data(), q.size()},
+                        {u.data(), u.size()});
+  return nb::make_tuple(q, u);
+}
+
+/// Runs `steps` steps, the next episode where one is over, and lets Ctrl-C through. Returns how
+/// many episodes ended.
+int run(Task& task, World& world, Robot& robot, long steps, Statistics* statistics) {
+  constexpr long kStepsBetweenSignals = 2048;
+  int ended = 0;
+  for (long done = 0; done < steps;) {
+    const long end = std::min(steps, done + kStepsBetweenSignals);
+    {
+      nb::gil_scoped_release free_interpreter;
+      for (; done < end; ++done) {
+        task.before_step(robot);
+        world.step();
+        if (statistics) statistics->observe(robot);
+        if (!task.after_step(robot)) continue;
+        ++ended;
+        task.reset(robot, task.episode() + 1);
+        if (statistics) statistics->begin(robot);
+      }
+    }
+    if (PyErr_CheckSignals() != 0) throw nb::python_error();
+  }
+  return ended;
+}
+
+void bind_statistics(nb::module_& m) {
+  nb::class_<Statistics>(m, "Statistics")
+      .def(
+          "__init__",
+          [](Statistics* self, const World& world, double settle, bool track_energy) {
+            new (self) Statistics(world.options(), settle, track_energy);
+          },
+          "world"_a, "settle"_a, "track_energy"_a)
+      .def("begin", &Statistics::begin, "robot"_a)
+      .def("observe", &Statistics::observe, "robot"_a)
+      .def_ro("steps", &Statistics::steps)
+      .def_ro("episodes", &Statistics::episodes)
+      .def_prop_ro("mean_penetration", &Statistics::mean_penetration)
+      .def_ro("max_penetration", &Statistics::max_penetration)
+      .def_ro("max_landing_penetration", &Statistics::max_landing_penetration)
+      .def_ro("max_velocity", &Statistics::max_velocity)
+      .def_ro("exploded", &Statistics::exploded)
+      .def_ro("max_energy_growth", &Statistics::max_energy_growth)
+      .def_ro("distance", &Statistics::distance)
+      .def_ro("slip", &Statistics::slip)
+      .def_ro("contacts", &Statistics::contacts)
+      .def_ro("sweeps", &Statistics::sweeps)
+      .def_ro("newton_steps", &Statistics::newton_steps)
+      .def_ro("substeps", &Statistics::substeps)
+      .def_ro("max_residual", &Statistics::max_residual)
+      .def_ro("not_converged", &Statistics::not_converged);
+}
+
+}  // namespace
+
+void bind_scenes(nb::module_& parent) {
+  nb::module_ m = parent.def_submodule("scenes");
+  m.def("task_names", &task_names);
+  m.def(
+      "task_model",
+      [](const std::string& task, ModelPtr anymal) {
+        return scenes::task_model(scenes::task_spec(task).kind, anymal);
+      },
+      "task"_a, "anymal"_a);
+  m.def("initial_state", &initial_state, "task"_a, "episode"_a);
+  nb::class_<Task>(m, "Task")
+      .def(
+          "__init__",
+          [](Task* self, const std::string& task, double time_step) {
+            new (self) Task(scenes::task_spec(task).kind, time_step);
+          },
+          "task"_a, "time_step"_a)
+      .def_prop_ro("episode", &Task::episode)
+      .def_prop_ro("time", &Task::time)
+      .def_prop_ro("episode_length", [](const Task& t) { return t.spec().episode; })
+      .def("reset", &Task::reset, "robot"_a, "episode"_a)
+      .def("run", &run, "world"_a, "robot"_a, "steps"_a, "statistics"_a.none() = nb::none());
+  bind_statistics(m);
+}
+
+}  // namespace stickslip::python
