@@ -21,7 +21,7 @@ struct FactoredOptions {
       0;  ///< ... plus this much of the largest free contact velocity (float needs it)
   double alpha = 1e-6;       ///< proximal weight of a Newton step ...
   double alpha_late = 1e-5;  ///< ... and after six of them
-  int max_sweeps = 10;  ///< before the fallback; maximum dissipation takes up to 100 times as many
+  int max_sweeps = 16;  ///< before the fallback; maximum dissipation takes up to 100 times as many
   bool fallback = true;
 };
 
@@ -51,31 +51,64 @@ struct FactoredInfo {
   int fallback_steps = 0;
 };
 
-/// Largest squared residual of the contacts; writes their velocities.
+/// |G_ii (lambda_i - local_i)|^2: what is left where the sliding law is maximum dissipation.
+template <class S>
+STICKSLIP_INLINE S fixed_point_residual_squared(const LocalContact<S>& k, const S v[3],
+                                                const S l[3]) {
+  S free[3], best[3], d[3];
+  int evaluations;
+  apply_block(k, l, free);
+  for (int r = 0; r < 3; ++r) free[r] = v[r] - free[r];
+  solve_halley<true>(k, free, sizeof(Value<S>) == 4 ? 1e-6 : 1e-13, best, evaluations);
+  for (int r = 0; r < 3; ++r) best[r] = l[r] - best[r];
+  apply_block(k, best, d);
+  return madd(d[0], d[0], madd(d[1], d[1], d[2] * d[2]));
+}
+
+/// Largest squared residual of the contacts; writes their velocities. Four contacts at a time for a
+/// plain scalar.
 template <int M, bool kMaxDissipation, class S>
 STICKSLIP_INLINE S certify(FactoredProblem<S>& p) {
-  S worst = constant<S>(0), sum = constant<S>(0);
-  for (int i = 0; i < p.size(); ++i) {
-    FactoredContact<S>& c = p.contact(i);
-    S l[3], e;
-    contact_velocity<M>(c, p.w, c.velocity);
-    store(c.lambda, l);
-    if constexpr (kMaxDissipation) {
-      S free[3], best[3], d[3];
-      int evaluations;
-      apply_block(c.local, l, free);
-      for (int r = 0; r < 3; ++r) free[r] = c.velocity[r] - free[r];
-      solve_halley<true>(c.local, free, sizeof(Value<S>) == 4 ? 1e-6 : 1e-13, best, evaluations);
-      for (int r = 0; r < 3; ++r) best[r] = l[r] - best[r];
-      apply_block(c.local, best, d);
-      e = madd(d[0], d[0], madd(d[1], d[1], d[2] * d[2]));
-    } else {
-      e = natural_map_residual_squared(c.local, c.velocity, l);
+  constexpr int kLanes = kMaxDissipation ? 1 : kChunk<S>;
+  using T = typename ChunkOf<S, kLanes != 1>::Type;
+  const int n = p.size();
+  T worst = constant<T>(0), sum = constant<T>(0);
+  for (int first = 0; first < n; first += kLanes) {
+    LocalContact<T> k;
+    T v[3], l[3];
+    for (int j = 0; j < kLanes; ++j) {
+      FactoredContact<S>& c = p.contact(first + j < n ? first + j : first);
+      S impulse[3];
+      contact_velocity<M>(c, p.w, c.velocity);
+      store(c.lambda, impulse);
+      const auto put = [j](T& to, S x) { reinterpret_cast<S*>(&to)[j] = x; };
+      for (int r = 0; r < 3; ++r) put(v[r], c.velocity[r]), put(l[r], impulse[r]);
+      if constexpr (kMaxDissipation) {
+        k = c.local;
+      } else {
+        put(k.scale, c.local.scale);
+        put(k.mu, c.local.mu);
+      }
     }
+    T e;
+    if constexpr (kMaxDissipation)
+      e = fixed_point_residual_squared(k, v, l);
+    else
+      e = natural_map_residual_squared(k, v, l);
     worst = max(worst, e);
     sum = sum + e;
   }
-  return madd(constant<S>(0), sum, worst);  // NaN if any is
+  worst = madd(constant<T>(0), sum, worst);  // NaN if any is
+  if constexpr (kLanes == 1) {
+    return worst;
+  } else {
+    S most = get_lane(worst, 0), total = most;
+    for (int j = 1; j < kLanes; ++j) {
+      most = max(most, get_lane(worst, j));
+      total = total + get_lane(worst, j);
+    }
+    return madd(constant<S>(0), total, most);
+  }
 }
 
 /// Sweeps and Newton steps until the change is small in every lane; returns the lanes that are
@@ -180,9 +213,11 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
   accumulate<M>(p);
   const S relative = constant<S>(o.tolerance_relative),
           absolute = constant<S>(o.tolerance_absolute);
-  const S tolerance_squared = madd(relative * relative, fastest, absolute * absolute);
   const S allowed =
       madd(constant<S>(o.residual_relative), sqrt(fastest), constant<S>(o.residual_tolerance));
+  // The change of a sweep says little below what the residual has to reach.
+  const S tolerance_squared =
+      min(madd(relative * relative, fastest, absolute * absolute), allowed * allowed);
   const auto finite = sum < constant<S>(1e30);  // false for NaN
   auto open = iterate<M, kMaxDissipation>(p, finite, tolerance_squared, o, info);
   S worst = certify<M, kMaxDissipation>(p);

@@ -77,6 +77,7 @@ struct FactoredContact {
   int* chunk_start;  // dof of a chunk's first lane
   Chunk<S>* yt;  // (3, chunks): transposed rows, zero where a chunk reaches past the touched dofs
   // Newton step.
+  Chunk<S>* yn;          // (3, chunks): columns of Y^T N
   Row3<S> n_columns[3];  // N, eliminated response of the contact
   S n_offset[3];
 };
@@ -195,11 +196,13 @@ class FactoredProblem {
       int* start = arena.take<int>(m);
       Row3<S>* y = arena.take<Row3<S>>(m);
       Chunk<S>* yt = arena.take<Chunk<S>>(3 * m);
+      Chunk<S>* yn = arena.take<Chunk<S>>(3 * m);
       if (memory) {
         contacts_[i].index = index;
         contacts_[i].chunk_start = start;
         contacts_[i].y = y;
         contacts_[i].yt = yt;
+        contacts_[i].yn = yn;
       }
     }
     if constexpr (!kIsDouble) {

@@ -116,70 +116,154 @@ STICKSLIP_INLINE void eliminate_contacts(FactoredProblem<S>& p, S alpha, const S
   }
 }
 
-/// matrix = I + sum Y^T N Y, its column m = -sum Y^T g.
+/// Columns of Y^T N of one contact over its shared dofs, in the layout of `yt`.
 template <int M, class S>
-STICKSLIP_INLINE void assemble(FactoredProblem<S>& p) {
-  const S zero = constant<S>(0), one = constant<S>(1);
-  const int m = M ? M : p.dofs(), stride = M ? FactoredProblem<S>::padded(M) : p.stride();
-  S *h = p.matrix, *t = p.scratch, g[M ? FactoredProblem<S>::padded(M ? M : 1) : 1];
-  S* rhs = M ? g : p.scratch + 2 * stride;
+STICKSLIP_INLINE void respond(FactoredContact<S>& c) {
+  const int chunks = M ? round_up(M, kChunk<S>) / kChunk<S> : c.chunks;
+  for (int r = 0; r < 3; ++r) {
+    S n[3];
+    store(c.n_columns[r], n);
+    for (int j = 0; j < chunks; ++j) {
+      Chunk<S> x = c.yt[j] * Chunk<S>(n[0]);
+      x = madd_chunk<S>(c.yt[chunks + j], n[1], x);
+      c.yn[r * chunks + j] = madd_chunk<S>(c.yt[2 * chunks + j], n[2], x);
+    }
+  }
+}
+
+/// -sum Y^T g into `rhs`.
+template <int M, class S>
+STICKSLIP_INLINE void gather_right_side(FactoredProblem<S>& p, S* rhs) {
+  for (int i = 0; i < p.stride(); ++i) rhs[i] = constant<S>(0);
+  for (int i = 0; i < p.size(); ++i) {
+    const FactoredContact<S>& c = p.contact(i);
+    const S minus[3] = {-c.n_offset[0], -c.n_offset[1], -c.n_offset[2]};
+    add_transposed<M>(c, minus, rhs);
+  }
+}
+
+/// Solves (I + sum Y^T N Y) x = -sum Y^T g; x lies in p.scratch. Elimination without pivoting: a
+/// breakdown shows as a huge or non-finite x, which the caller rejects. This one keeps the matrix
+/// in registers, row by row in chunks.
+template <int M, class S>
+STICKSLIP_INLINE S* solve_fixed(FactoredProblem<S>& p) {
+  constexpr int K = kChunk<S>, kColumns = round_up(M, K) / K, kAll = round_up(M + 1, K) / K;
+  const S zero = constant<S>(0), one = constant<S>(1), tiny = constant<S>(1e-30);
+  S* x = p.scratch;
+  gather_right_side<M>(p, x);
+  Chunk<S> row[M][kAll];
+  const auto at = [](const Chunk<S>* r, int k) {
+    if constexpr (K > 1)
+      return S(r[k / K].v[k % K]);
+    else
+      return r[k];
+  };
+  const auto put = [](Chunk<S>* r, int k, S v) {
+    if constexpr (K > 1)
+      r[k / K].v[k % K] = v;
+    else
+      r[k] = v;
+  };
+#pragma GCC unroll 8
+  for (int q = 0; q < kColumns; ++q) {
+    Chunk<S> sum[M];
+#pragma GCC unroll 8
+    for (int i = 0; i < M; ++i) {
+      sum[i] = Chunk<S>(zero);
+      if (i / K == q) put(sum + i, i % K, one);
+    }
+    for (int k = 0; k < p.size(); ++k) {
+      const FactoredContact<S>& c = p.contact(k);
+#pragma GCC unroll 3
+      for (int r = 0; r < 3; ++r) {
+        const S* t = reinterpret_cast<const S*>(c.yn + r * kColumns);
+#pragma GCC unroll 8
+        for (int i = 0; i < M; ++i) sum[i] = madd_chunk<S>(c.yt[r * kColumns + q], t[i], sum[i]);
+      }
+    }
+#pragma GCC unroll 8
+    for (int i = 0; i < M; ++i) row[i][q] = sum[i];
+  }
+#pragma GCC unroll 8
+  for (int i = 0; i < M; ++i) {
+    if constexpr (kAll > kColumns) row[i][kAll - 1] = Chunk<S>(zero);
+    put(row[i], M, x[i]);
+  }
+  S inverse[M];
+#pragma GCC unroll 8
+  for (int j = 0; j < M; ++j) {
+    const S d = at(row[j], j);
+    inverse[j] = one / select(abs(d) > tiny, d, tiny);
+#pragma GCC unroll 8
+    for (int i = j + 1; i < M; ++i) {
+      const S f = -(at(row[i], j) * inverse[j]);
+#pragma GCC unroll 8
+      for (int q = j / K; q < kAll; ++q) row[i][q] = madd_chunk<S>(row[j][q], f, row[i][q]);
+    }
+  }
+  S y[M];
+#pragma GCC unroll 8
+  for (int i = 0; i < M; ++i) y[i] = at(row[i], M);
+#pragma GCC unroll 8
+  for (int i = M - 1; i >= 0; --i) {
+    y[i] = y[i] * inverse[i];
+#pragma GCC unroll 8
+    for (int k = 0; k < i; ++k) y[k] = nmadd(at(row[k], i), y[i], y[k]);
+    x[i] = y[i];
+  }
+  return x;
+}
+
+/// The same for any number of shared dofs, in p.matrix.
+template <class S>
+STICKSLIP_INLINE S* solve_any(FactoredProblem<S>& p) {
+  constexpr int K = kChunk<S>;
+  const S zero = constant<S>(0), one = constant<S>(1), tiny = constant<S>(1e-30);
+  const int m = p.dofs(), stride = p.stride();
+  S *h = p.matrix, *x = p.scratch;
+  gather_right_side<0>(p, x);
   for (int i = 0; i < m * stride; ++i) h[i] = zero;
-  for (int i = 0; i < stride; ++i) rhs[i] = zero;
   for (int i = 0; i < m; ++i) h[i * stride + i] = one;
   for (int i = 0; i < p.size(); ++i) {
     const FactoredContact<S>& c = p.contact(i);
-    const int count = M ? M : c.count, chunks = M ? round_up(M, kChunk<S>) / kChunk<S> : c.chunks;
-    S n[3][3];
-    for (int j = 0; j < 3; ++j) store(c.n_columns[j], n[j]);
-    S minus[3] = {-c.n_offset[0], -c.n_offset[1], -c.n_offset[2]};
-    add_transposed<M>(c, minus, rhs);
-    for (int r = 0; r < 3; ++r) {
-      // Column r of Y^T N, over the shared dofs of the contact.
-      for (int j = 0; j < chunks; ++j) {
-        const int start = M ? j * kChunk<S> : c.chunk_start[j];
-        Chunk<S> x = c.yt[j] * Chunk<S>(n[r][0]);
-        x = madd_chunk<S>(c.yt[chunks + j], n[r][1], x);
-        x = madd_chunk<S>(c.yt[2 * chunks + j], n[r][2], x);
-        store_chunk(t + start, x);
-      }
-      for (int k = 0; k < count; ++k) {
-        const int row = M ? k : c.index[k];
-        for (int q = 0; q < chunks; ++q) {
-          S* to = h + row * stride + (M ? q * kChunk<S> : c.chunk_start[q]);
-          store_chunk(to, madd_chunk<S>(c.yt[r * chunks + q], t[row], load_chunk(to)));
+    for (int r = 0; r < 3; ++r)
+      for (int j = 0, k = 0; j < c.chunks; ++j)
+        for (; k < c.count && c.index[k] < c.chunk_start[j] + K; ++k) {
+          const S t =
+              reinterpret_cast<const S*>(c.yn + r * c.chunks + j)[c.index[k] - c.chunk_start[j]];
+          for (int q = 0; q < c.chunks; ++q) {
+            S* to = h + c.index[k] * stride + c.chunk_start[q];
+            store_chunk(to, madd_chunk<S>(c.yt[r * c.chunks + q], t, load_chunk(to)));
+          }
         }
-      }
-    }
   }
-  for (int i = 0; i < m; ++i) h[i * stride + m] = rhs[i];
-}
-
-/// Solves matrix x = column m by elimination without pivoting (the identity and N make the diagonal
-/// dominate in practice; a breakdown shows as a huge or non-finite x, which the caller rejects). x
-/// is left in p.scratch.
-template <int M, class S>
-STICKSLIP_INLINE S* solve_shared(FactoredProblem<S>& p) {
-  const S one = constant<S>(1), zero = constant<S>(0), tiny = constant<S>(1e-30);
-  const int m = M ? M : p.dofs(), stride = M ? FactoredProblem<S>::padded(M) : p.stride();
-  S *h = p.matrix, *x = p.scratch;
+  for (int i = 0; i < m; ++i) h[i * stride + m] = x[i];
   for (int j = 0; j < m; ++j) {
     const S* pivot = h + j * stride;
     const S d = pivot[j], inv = one / select(abs(d) > tiny, d, tiny);
     for (int i = j + 1; i < m; ++i) {
       S* row = h + i * stride;
-      const S f = row[j] * inv;
-      for (int k = j / kChunk<S> * kChunk<S>; k <= m; k += kChunk<S>)
-        store_chunk(row + k, madd_chunk<S>(load_chunk(pivot + k), -f, load_chunk(row + k)));
+      const S f = -(row[j] * inv);
+      for (int k = j / K * K; k <= m; k += K)
+        store_chunk(row + k, madd_chunk<S>(load_chunk(pivot + k), f, load_chunk(row + k)));
     }
     h[j * stride + j] = inv;
   }
   for (int i = 0; i < m; ++i) x[i] = h[i * stride + m];
-  for (int i = m; i < stride; ++i) x[i] = zero;
   for (int i = m - 1; i >= 0; --i) {
     x[i] = x[i] * h[i * stride + i];
     for (int k = 0; k < i; ++k) x[k] = nmadd(h[k * stride + i], x[i], x[k]);
   }
   return x;
+}
+
+template <int M, class S>
+STICKSLIP_INLINE S* solve_shared(FactoredProblem<S>& p) {
+  for (int i = 0; i < p.size(); ++i) respond<M>(p.contact(i));
+  if constexpr (M > 0)
+    return solve_fixed<M>(p);
+  else
+    return solve_any(p);
 }
 
 /// One guarded Newton step on the lanes `live`: impulses return to the cone (normal kept), w
@@ -189,7 +273,6 @@ template <int M, class S>
 STICKSLIP_INLINE void newton_step(FactoredProblem<S>& p, Mask<S> live, S alpha) {
   const S zero = constant<S>(0), one = constant<S>(1), huge = constant<S>(1e6);
   eliminate_contacts<M>(p, alpha, static_cast<const S*>(nullptr));
-  assemble<M>(p);
   const S* x = solve_shared<M>(p);
   S size = zero;
   for (int k = 0; k < (M ? M : p.dofs()); ++k) size = size + abs(x[k]);
