@@ -23,6 +23,8 @@ using namespace nb::literals;
 namespace stickslip::python {
 namespace {
 
+// Arrays own their data, so properties that make them say rv_policy::move: the default of a
+// property would tie the array to its object as well, which nanobind refuses.
 ArrayOut to_numpy(const double* values, std::initializer_list<std::size_t> shape) {
   return make_array(shape,
                     [&](std::span<double> to) { std::copy_n(values, to.size(), to.begin()); });
@@ -94,9 +96,11 @@ Pose make_pose(const Vector3& position, const std::array<double, 4>& q) {
 void bind_parts(nb::module_& m) {
   nb::class_<Pose>(m, "Pose", "Pose of frame B in frame A: p_A = rotation @ p_B + position.")
       .def_prop_ro(
-          "position", [](const Pose& p) { return vector3(p.position); }, "(3,) [m]")
+          "position", [](const Pose& p) { return vector3(p.position); }, nb::rv_policy::move,
+          "(3,) [m]")
       .def_prop_ro(
-          "rotation", [](const Pose& p) { return matrix3(p.rotation); }, "(3, 3) rotation matrix");
+          "rotation", [](const Pose& p) { return matrix3(p.rotation); }, nb::rv_policy::move,
+          "(3, 3) rotation matrix");
 
   nb::class_<Body>(m, "Body", "One rigid body: a link with everything merged that is fixed to it.")
       .def_ro("name", &Body::name)
@@ -105,9 +109,9 @@ void bind_parts(nb::module_& m) {
           "mass", [](const Body& b) { return b.inertial.mass; }, "[kg]")
       .def_prop_ro(
           "center_of_mass", [](const Body& b) { return vector3(b.inertial.center_of_mass); },
-          "(3,) in the body frame [m]")
+          nb::rv_policy::move, "(3,) in the body frame [m]")
       .def_prop_ro(
-          "inertia", [](const Body& b) { return inertia_matrix(b.inertial); },
+          "inertia", [](const Body& b) { return inertia_matrix(b.inertial); }, nb::rv_policy::move,
           "(3, 3) about the center of mass, in body axes [kg m^2]")
       .def("__repr__", [](const Body& b) { return "<Body '" + b.name + "'>"; });
 
@@ -119,7 +123,7 @@ void bind_parts(nb::module_& m) {
       .def_ro("parent_body", &Joint::parent_body, "Index of the body the joint hangs on.")
       .def_ro("pose", &Joint::pose, "Joint frame in the parent body frame.")
       .def_prop_ro(
-          "axis", [](const Joint& j) { return vector3(j.axis); },
+          "axis", [](const Joint& j) { return vector3(j.axis); }, nb::rv_policy::move,
           "(3,) unit axis in the joint frame")
       .def_ro("lower", &Joint::lower, "[rad or m]; -inf where the joint has none")
       .def_ro("upper", &Joint::upper, "[rad or m]; +inf where the joint has none")
@@ -147,12 +151,13 @@ void bind_parts(nb::module_& m) {
       .def_ro("body", &Shape::body, "Index of the body it is fixed to.")
       .def_ro("pose", &Shape::pose, "In the body frame.")
       .def_prop_ro(
-          "size", [](const Shape& s) { return vector3(s.size); },
+          "size", [](const Shape& s) { return vector3(s.size); }, nb::rv_policy::move,
           "(3,) box: side lengths; sphere: radius; cylinder, capsule: radius, length without the "
           "caps [m]")
       .def_ro("mesh_file", &Shape::mesh_file, "Mesh: file reference as written in the description.")
       .def_prop_ro(
-          "mesh_scale", [](const Shape& s) { return vector3(s.mesh_scale); }, "(3,)")
+          "mesh_scale", [](const Shape& s) { return vector3(s.mesh_scale); }, nb::rv_policy::move,
+          "(3,)")
       .def_ro("material", &Shape::material, "Contact material; empty: the robot's.")
       .def("__repr__", [](const Shape& s) {
         return "<Shape '" + s.name + "', " + kShapeNames[static_cast<int>(s.type)] + ">";
@@ -189,18 +194,18 @@ void bind_model_class(nb::module_& m) {
       .def_prop_ro("frame_names", [](const Model& self) { return names(self.frames()); })
       .def_prop_ro(
           "lower", [](const Model& self) { return joint_values(self, &Joint::lower); },
-          "(num_joints,) [rad or m]")
+          nb::rv_policy::move, "(num_joints,) [rad or m]")
       .def_prop_ro(
           "upper", [](const Model& self) { return joint_values(self, &Joint::upper); },
-          "(num_joints,) [rad or m]")
+          nb::rv_policy::move, "(num_joints,) [rad or m]")
       .def_prop_ro(
           "velocity_limit",
           [](const Model& self) { return joint_values(self, &Joint::velocity_limit); },
-          "(num_joints,) [rad/s or m/s]")
+          nb::rv_policy::move, "(num_joints,) [rad/s or m/s]")
       .def_prop_ro(
           "effort_limit",
           [](const Model& self) { return joint_values(self, &Joint::effort_limit); },
-          "(num_joints,) [N m or N]")
+          nb::rv_policy::move, "(num_joints,) [N m or N]")
       .def("joint_index", &Model::joint_index, "name"_a, "Raises ModelError that lists the names.")
       .def("body_index", &Model::body_index, "name"_a, "Raises ModelError that lists the names.")
       .def("frame", &Model::frame, "name"_a, nb::rv_policy::reference_internal,
@@ -218,7 +223,7 @@ void bind_model_class(nb::module_& m) {
       "path"_a, "base"_a = "floating",
       "Reads a robot from a URDF file. Fixed joints are merged into their parents; their links "
       "stay as frames.\n\n"
-      "Raises FileError or ModelError, which name the file, the element and what to do.");
+      "Raises FileNotFoundError or ModelError, which name the file, the element and what to do.");
   m.def(
       "parse_urdf",
       [](const std::string& xml, const std::string& base, const std::string& source) {
@@ -327,6 +332,8 @@ void bind_builder(nb::module_& m) {
 }  // namespace
 
 void bind_model(nb::module_& m) {
+  // A class of its own, so that callers can tell an unusable description from other bad values.
+  nb::exception<ModelError>(m, "ModelError", PyExc_ValueError).attr("__module__") = "stickslip";
   bind_parts(m);
   bind_model_class(m);
   bind_builder(m);
