@@ -1,4 +1,5 @@
-// Times the single-contact methods on given contacts (Table I of [Hwangbo 2018]): interleaved rounds, medians.
+// Times the single-contact methods on given contacts (Table I of [Hwangbo 2018]): interleaved
+// rounds, medians.
 #pragma once
 #include <algorithm>
 #include <chrono>
@@ -13,9 +14,11 @@ namespace stickslip::benchmarks {
 
 /// One method's figures over all contacts.
 struct MethodTime {
-  double ns_per_solve = 0;  ///< median over the rounds, opening and sticking tests included, precomputation not
-  double evaluations = 0;   ///< mean per sliding contact
-  double failures = 0;      ///< share of contacts that the method says or the certificate shows it did not solve
+  double ns_per_solve =
+      0;  ///< median over the rounds, opening and sticking tests included, precomputation not
+  double evaluations = 0;  ///< mean per sliding contact
+  double failures =
+      0;  ///< share of contacts that the method says or the certificate shows it did not solve
 };
 
 /// Contacts prepared once, as a step does.
@@ -28,9 +31,11 @@ struct TimedContacts {
 };
 
 /// `G` row-major (n, 3, 3) [1/kg], `c` (n, 3) [m/s], `mu` (n).
-inline TimedContacts prepare_contacts(const double* G, const double* c, const double* mu, std::size_t n) {
+inline TimedContacts prepare_contacts(const double* G, const double* c, const double* mu,
+                                      std::size_t n) {
   TimedContacts t;
-  t.local.resize(n), t.c.assign(c, c + 3 * n), t.impulse.resize(3 * n), t.evaluations.resize(n), t.converged.resize(n);
+  t.local.resize(n), t.c.assign(c, c + 3 * n), t.impulse.resize(3 * n), t.evaluations.resize(n),
+      t.converged.resize(n);
   for (std::size_t i = 0; i < n; ++i, G += 9) {
     auto& k = t.local[i];
     k.xx = G[0], k.xy = G[1], k.xz = G[2], k.yy = G[4], k.yz = G[5], k.zz = G[8], k.mu = mu[i];
@@ -44,8 +49,10 @@ template <contact::Method method, bool kMaxDissipation>
 inline double time_pass(TimedContacts& t, double tolerance) {
   const auto start = std::chrono::steady_clock::now();
   for (std::size_t i = 0; i < t.local.size(); ++i) {
-    // Halley stops at a velocity; a tenth of what the impulse tolerance changes keeps its impulse error below it as well.
-    const double stop = method == contact::Method::kHalley ? 0.1 * tolerance * t.local[i].scale : tolerance;
+    // Halley stops at a velocity; a tenth of what the impulse tolerance changes keeps its impulse
+    // error below it as well.
+    const double stop =
+        method == contact::Method::kHalley ? 0.1 * tolerance * t.local[i].scale : tolerance;
     const auto s = contact::solve_single<method, kMaxDissipation>(t.local[i], &t.c[3 * i], stop);
     t.impulse[3 * i] = s.x, t.impulse[3 * i + 1] = s.y, t.impulse[3 * i + 2] = s.z;
     t.evaluations[i] = s.evaluations, t.converged[i] = s.converged;
@@ -53,7 +60,8 @@ inline double time_pass(TimedContacts& t, double tolerance) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-inline double time_pass(TimedContacts& t, contact::Method method, bool max_dissipation, double tolerance) {
+inline double time_pass(TimedContacts& t, contact::Method method, bool max_dissipation,
+                        double tolerance) {
   double seconds = NAN;
   contact::with_method(method, max_dissipation, [&](auto m, auto law) {
     seconds = time_pass<decltype(m)::value, decltype(law)::value>(t, tolerance);
@@ -61,8 +69,10 @@ inline double time_pass(TimedContacts& t, contact::Method method, bool max_dissi
   return seconds;
 }
 
-/// Velocity by which one contact misses its law [m/s]. Coulomb: natural map. Maximum dissipation: |G (lambda - exact)|.
-inline double miss(const contact::LocalContact<double>& k, const double c[3], const double lambda[3], bool max_dissipation) {
+/// Velocity by which one contact misses its law [m/s]. Coulomb: natural map. Maximum dissipation:
+/// |G (lambda - exact)|.
+inline double miss(const contact::LocalContact<double>& k, const double c[3],
+                   const double lambda[3], bool max_dissipation) {
   double v[3];
   if (max_dissipation) {
     const auto s = contact::solve_single<contact::Method::kHalley, true>(k, c, 0);
@@ -75,25 +85,30 @@ inline double miss(const contact::LocalContact<double>& k, const double c[3], co
   return contact::natural_map_residual(k, v, lambda);
 }
 
-/// Figures of the last pass; a contact fails if the method says so or if it misses its law by more than ten times what
-/// the tolerance allows, `tolerance` [N s] times the block's size.
-inline MethodTime figures(const TimedContacts& t, double seconds, bool max_dissipation, double tolerance) {
+/// Figures of the last pass; a contact fails if the method says so or if it misses its law by more
+/// than ten times what the tolerance allows, `tolerance` [N s] times the block's size.
+inline MethodTime figures(const TimedContacts& t, double seconds, bool max_dissipation,
+                          double tolerance) {
   MethodTime m;
   m.ns_per_solve = 1e9 * seconds / t.local.size();
   std::size_t slips = 0, failed = 0;
   for (std::size_t i = 0; i < t.local.size(); ++i) {
     slips += t.evaluations[i] > 0, m.evaluations += t.evaluations[i];
     const double allowed = 10 * tolerance * std::max(3 * t.local[i].scale, 1.0);
-    failed += !t.converged[i] || !(miss(t.local[i], &t.c[3 * i], &t.impulse[3 * i], max_dissipation) <= allowed);
+    failed += !t.converged[i] ||
+              !(miss(t.local[i], &t.c[3 * i], &t.impulse[3 * i], max_dissipation) <= allowed);
   }
   m.evaluations /= std::max<std::size_t>(slips, 1);
   m.failures = double(failed) / t.local.size();
   return m;
 }
 
-/// All methods on the same contacts, one pass each per round, so that a slow moment of the machine hits all of them.
-inline std::vector<MethodTime> time_methods(TimedContacts& t, const std::vector<contact::Method>& methods,
-                                            bool max_dissipation, double tolerance, int rounds = 7) {
+/// All methods on the same contacts, one pass each per round, so that a slow moment of the machine
+/// hits all of them.
+inline std::vector<MethodTime> time_methods(TimedContacts& t,
+                                            const std::vector<contact::Method>& methods,
+                                            bool max_dissipation, double tolerance,
+                                            int rounds = 7) {
   std::vector<std::vector<double>> seconds(methods.size());
   std::vector<MethodTime> out;
   for (int round = 0; round < rounds; ++round)

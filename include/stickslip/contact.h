@@ -1,7 +1,8 @@
 // Frictional contact problems and their solvers, without robots.
 //
-// For n contacts, find impulses lambda [N s] so that v = G lambda + c [m/s] obeys Signorini's condition and Coulomb's
-// law at each contact (docs/theory/contact.md). Per contact the order is x, y (tangential), z (normal).
+// For n contacts, find impulses lambda [N s] so that v = G lambda + c [m/s] obeys Signorini's
+// condition and Coulomb's law at each contact (docs/theory/contact.md). Per contact the order is x,
+// y (tangential), z (normal).
 #pragma once
 #include <string>
 #include <vector>
@@ -27,31 +28,49 @@ enum class SolveMethod {
 /// How a solve ended. Anything but kConverged returns the best impulse found, with its residual.
 enum class SolveStatus {
   kConverged,     ///< the largest contact residual is at most the tolerance
-  kNotConverged,  ///< cause: sweeps or steps used up; the residual says how far; raise max_sweeps or use kAuto
+  kNotConverged,  ///< cause: sweeps or steps used up; the residual says how far; raise max_sweeps
+                  ///< or use kAuto
   kInfeasible,    ///< a contact cannot push (G_zz near 0) and its normal velocity stays negative
 };
 
-/// A dense contact problem. `delassus` is row-major (3n, 3n) [1/kg], symmetric positive semidefinite; `free_velocity` (3n)
-/// [m/s]; `friction` (n) [1], zero or positive.
+/// What ends the sweeps of kPerContact and kPgs, once it is at most the tolerance.
+enum class StopTest {
+  kResidual,      ///< the largest contact residual [m/s]
+  kViolationSum,  ///< what each contact violates of its law, added [m/s]: the paper's for
+                  ///< kPerContact
+  kUpdateSum,  ///< impulse updates [N s] and penetration velocities [m/s], added: the paper's for
+               ///< kPgs
+};
+
+/// A dense contact problem. `delassus` is row-major (3n, 3n) [1/kg], symmetric positive
+/// semidefinite; `free_velocity` (3n) [m/s]; `friction` (n) [1], zero or positive; infinite and
+/// huge values count as 1e4.
 struct ContactProblem {
   std::vector<double> delassus;
   std::vector<double> free_velocity;
   std::vector<double> friction;
   int num_contacts() const { return static_cast<int>(friction.size()); }
-  /// Throws ModelError that names the argument and its first offending index (lengths, NaN, asymmetry, negative
-  /// diagonal, negative friction).
+  /// Throws ModelError that names the argument and its first offending index (lengths, NaN,
+  /// asymmetry, negative diagonal, indefinite matrix, negative friction).
   void validate() const;
 };
 
 struct SolveOptions {
   SolveMethod method = SolveMethod::kAuto;
-  FrictionLaw law = FrictionLaw::kCoulomb;
-  double tolerance = 1e-9;  ///< on the largest contact residual [m/s]
+  FrictionLaw law = FrictionLaw::kCoulomb;  ///< kPgs knows kCoulomb only
+  double tolerance =
+      1e-9;  ///< on the largest contact residual [m/s], or on the sum that `stop` names
   int max_sweeps = 1000;
-  SingleContactMethod single_contact = SingleContactMethod::kHalley;  ///< kPerContact only
-  double alpha = 1.0;       ///< relaxation at the first sweep; kPgs: the constant factor of eq. 18 (0.6 in the paper)
-  double alpha_min = 0.7;   ///< kPerContact: where alpha decays to
-  double gamma = 1.0;       ///< kPerContact: decay per sweep (0.99 in the paper); 1 keeps alpha
+  /// kPerContact only. kGoldenSection minimizes an energy, so it knows kMaxDissipation only.
+  SingleContactMethod single_contact = SingleContactMethod::kHalley;
+  double single_contact_tolerance =
+      0;               ///< kPerContact: [N s]; 0: a tenth of what `tolerance` asks for
+  double alpha = 1.0;  ///< relaxation at the first sweep; kPgs: the constant factor of eq. 18 (0.6
+                       ///< in the paper)
+  double alpha_min = 0.7;  ///< kPerContact: where alpha decays to
+  double gamma = 1.0;      ///< kPerContact: decay per sweep (0.99 in the paper); 1 keeps alpha
+  StopTest stop =
+      StopTest::kResidual;  ///< kPerContact and kPgs; the status looks at the residual in any case
   bool record_history = false;
   void validate() const;  ///< throws ModelError
 };
@@ -64,33 +83,38 @@ struct SolveResult {
   int sweeps = 0;
   int newton_steps = 0;
   SolveStatus status = SolveStatus::kNotConverged;
-  std::vector<double> history;            ///< residual after each sweep [m/s], if recorded
+  /// If recorded: the value of the stop test after each sweep; kAuto: the residual after each
+  /// stage.
+  std::vector<double> history;
 };
 
 /// Solves a problem; `warm_start` is empty or (3n). Throws only for bad input (see `validate`).
 SolveResult solve(const ContactProblem& problem, const SolveOptions& options = {},
                   const std::vector<double>& warm_start = {});
 
-/// Residual of each contact (n) [m/s]; a pure function of its arguments and the only definition of "solved" in the project.
-/// Coulomb: De Saxce natural map with rho_i = 3 / trace(G_ii). Maximum dissipation: |G_ii (lambda_i - local_i)|, where
-/// local_i is the exact single-contact solution with the others held.
+/// Residual of each contact (n) [m/s]; a pure function of its arguments and the only definition of
+/// "solved" in the project. Coulomb: De Saxce natural map with rho_i = 3 / trace(G_ii). Maximum
+/// dissipation: |G_ii (lambda_i - local_i)|, where local_i is the exact single-contact solution
+/// with the others held. Throws ModelError for bad input.
 std::vector<double> residual(const ContactProblem& problem, const std::vector<double>& impulse,
                              FrictionLaw law = FrictionLaw::kCoulomb);
 
 struct SingleContactOptions {
   SingleContactMethod method = SingleContactMethod::kHalley;
   FrictionLaw law = FrictionLaw::kCoulomb;
-  double tolerance = 1e-10;  ///< kHalley: residual velocity relative to |c|; the others: impulse interval [N s]
+  double tolerance =
+      1e-10;  ///< kHalley: residual velocity relative to |c|; the others: impulse interval [N s]
 };
 
 struct SingleContactResult {
-  double impulse[3];   ///< [N s]
-  int evaluations = 0; ///< of the gradient or energy; 0 when open or sticking
-  bool converged = true;
+  double impulse[3];      ///< [N s]
+  int evaluations = 0;    ///< of the gradient or energy; 0 when open or sticking
+  bool converged = true;  ///< false: the method failed; the impulse is the best point it saw
 };
 
-/// Solves one contact: `delassus` row-major 3x3 [1/kg], `free_velocity` (3) [m/s].
-SingleContactResult solve_contact(const double delassus[9], const double free_velocity[3], double friction,
-                                  const SingleContactOptions& options = {});
+/// Solves one contact: `delassus` row-major 3x3 [1/kg], `free_velocity` (3) [m/s]. Throws
+/// ModelError for bad input.
+SingleContactResult solve_contact(const double delassus[9], const double free_velocity[3],
+                                  double friction, const SingleContactOptions& options = {});
 
 }  // namespace stickslip

@@ -1,13 +1,18 @@
-// Bisection on the angle of a sliding impulse: [Hwangbo 2018] Algorithm 1 with its printed faults corrected.
+// Bisection on the angle of a sliding impulse: [Hwangbo 2018] Algorithm 1 with its printed faults
+// corrected.
 //
 // Where we differ from the printed algorithm, and why (docs/theory/contact.md, section 6):
-//  - line 13: "out of sight" is grad h2 . (lambda - lambda_0) > 0; with the printed "<" the stepping never ends;
-//  - lines 13-14: a rejected step restores lambda together with theta, or line 33 compares with a rejected point;
-//  - line 6: a start that is optimal already (isotropic G) returns at once, or alpha = 0 steps forever;
+//  - line 13: "out of sight" is grad h2 . (lambda - lambda_0) > 0; with the printed "<" the
+//  stepping never ends;
+//  - lines 13-14: a rejected step restores lambda together with theta, or line 33 compares with a
+//  rejected point;
+//  - line 6: a start that is optimal already (isotropic G) returns at once, or alpha = 0 steps
+//  forever;
 //  - lines 29, 31: lambda and lambda^p follow their angles, or line 33 never changes;
-//  - both loops are capped, a step never turns by more than pi in all, and the midpoint of the last interval is returned.
-// Coulomb's law (kappa = 0) has the same sign change between theta_0 and the direction of S e_0, less than 90 degrees
-// away (C19), so the stepping stops there.
+//  - both loops are capped, a step never turns by more than pi in all, and the midpoint of the last
+//  interval is returned.
+// Coulomb's law (kappa = 0) has the same sign change between theta_0 and the direction of S e_0,
+// less than 90 degrees away (C19), so the stepping stops there.
 #pragma once
 #include "contact/slip.h"
 
@@ -15,9 +20,9 @@ namespace stickslip::contact {
 
 /// beta_1..3 of Algorithm 1. The paper does not print its values; these are the ones in use since.
 struct BisectionSteps {
-  double first = 0.01;   // beta_1 [rad]
-  double shrink = 0.5;   // beta_2
-  double grow = 1.3;     // beta_3
+  double first = 0.01;  // beta_1 [rad]
+  double shrink = 0.5;  // beta_2
+  double grow = 1.3;    // beta_3
 };
 
 /// Signed angle from theta_0 to the end of the Coulomb bracket, in (-pi/2, pi/2), (C19).
@@ -42,7 +47,8 @@ inline SlipSolution solve_bisection(const SlipProblem& p, bool coulomb, double t
   // How far the stepping may turn, and which way: against the gradient.
   const double sign = gradient0 > 0 ? -1 : 1;
   const double reach = coulomb ? sign * coulomb_bracket(p) : kPi;
-  if (!(reach > 0)) return slip_solution(p, point, evaluations, true);  // gradient0 is rounding error
+  if (!(reach > 0))
+    return slip_solution(p, point, evaluations, true);  // gradient0 is rounding error
 
   // Lines 7-23: step until the gradient changes sign.
   double turn = 0, previous_turn = 0, step = beta.first;
@@ -69,7 +75,8 @@ inline SlipSolution solve_bisection(const SlipProblem& p, bool coulomb, double t
   }
   if (!found) return slip_solution(p, point, evaluations, step < 1e-16);
 
-  // Lines 24-33: halve. The interval of angles is one rounding wide at the latest after 60 halvings.
+  // Lines 24-33: halve. The interval of angles is one rounding wide at the latest after 60
+  // halvings.
   double low = previous_turn, high = turn;
   ConicPoint low_point = previous, high_point = point;
   bool converged = false;
@@ -86,7 +93,8 @@ inline SlipSolution solve_bisection(const SlipProblem& p, bool coulomb, double t
   }
   // An interval that cannot be halved any more is as good as double gets: that is not a failure.
   converged = converged || high - low < 1e-14;
-  return slip_solution(p, conic_point(p, theta0 + sign * 0.5 * (low + high)), evaluations, converged);
+  return slip_solution(p, conic_point(p, theta0 + sign * 0.5 * (low + high)), evaluations,
+                       converged);
 }
 
 }  // namespace stickslip::contact

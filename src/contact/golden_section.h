@@ -1,9 +1,11 @@
-// Golden section search for a sliding impulse of least energy, as Preclik describes it ([Preclik 2014], [Preclik 2017]).
+// Golden section search for a sliding impulse of least energy, as Preclik describes it ([Preclik
+// 2014], [Preclik 2017]).
 //
-// Energy values alone are compared, so the angle cannot be known better than sqrt(rounding): about 1e-8 of |lambda|.
-// The search interval is the intersection of two arcs, found with inverse trigonometric functions as he does (the
-// "initial overhead" of [Hwangbo 2018] section VI): I, where the radius is positive (the branch), and J, in line of
-// sight of the stick impulse. It minimizes eq. 8; Coulomb's law (eq. 6) is no minimization, so there is no Coulomb form.
+// Energy values alone are compared, so the angle cannot be known better than sqrt(rounding): about
+// 1e-8 of |lambda|. The search interval is the intersection of two arcs, found with inverse
+// trigonometric functions as he does (the "initial overhead" of [Hwangbo 2018] section VI): I,
+// where the radius is positive (the branch), and J, in line of sight of the stick impulse. It
+// minimizes eq. 8; Coulomb's law (eq. 6) is no minimization, so there is no Coulomb form.
 #pragma once
 #include "contact/slip.h"
 
@@ -56,11 +58,13 @@ inline SlipSolution solve_golden_section(const SlipProblem& p, double tolerance)
   constexpr int kMaxEvaluations = 200;
   Arc arc = golden_interval(p);
   const auto energy = [&p](const ConicPoint& q) { return q.d > 0 ? conic_energy(p, q) : kHuge; };
-  double inner_left = arc.right - kRatio * (arc.right - arc.left), inner_right = arc.left + kRatio * (arc.right - arc.left);
+  double inner_left = arc.right - kRatio * (arc.right - arc.left),
+         inner_right = arc.left + kRatio * (arc.right - arc.left);
   ConicPoint left = conic_point(p, inner_left), right = conic_point(p, inner_right);
   double energy_left = energy(left), energy_right = energy(right);
   int evaluations = 2;
-  // The end of the interval on the side that has not moved yet is not an evaluated point; the interval counts as open.
+  // The end of the interval on the side that has not moved yet is not an evaluated point; the
+  // interval counts as open.
   ConicPoint end_left = left, end_right = right;
   bool moved_left = false, moved_right = false, converged = false;
   while (evaluations < kMaxEvaluations) {
@@ -76,13 +80,17 @@ inline SlipSolution solve_golden_section(const SlipProblem& p, double tolerance)
       right = conic_point(p, inner_right), energy_right = energy(right);
     }
     ++evaluations;
-    converged = moved_left && moved_right && impulse_distance2(p, end_left, end_right) < tolerance * tolerance;
+    converged = moved_left && moved_right &&
+                impulse_distance2(p, end_left, end_right) < tolerance * tolerance;
     if (converged || arc.right - arc.left < 1e-14) break;
   }
   const ConicPoint best = energy_left < energy_right ? left : right;
-  // Below sqrt(rounding) energies are equal and the search wanders: such an answer is not called converged.
+  // Below sqrt(rounding) energies are equal and the search wanders: such an answer is not called
+  // converged.
   const double resolution = 3e-8 * best.r;
-  return slip_solution(p, best, evaluations, best.d > 0 && (converged || moved_left != moved_right) && tolerance > resolution);
+  return slip_solution(
+      p, best, evaluations,
+      best.d > 0 && (converged || moved_left != moved_right) && tolerance > resolution);
 }
 
 }  // namespace stickslip::contact

@@ -1,8 +1,11 @@
-// The analytic method: the quartic of (C17) in closed form (Ferrari), and the checks that pick its root.
+// The analytic method: the quartic of (C15) in closed form (Ferrari), and the checks that pick its
+// root.
 //
-//   p(tau) = (1 + tau^2)^2 G,  tau = tan((theta - theta_0) / 2),  basis e_0 = stick_T / |stick_T|, J e_0
-// Closed form loses digits where roots meet or q_4 vanishes (nearly isotropic G): that is the method's weakness, so its
-// failures are reported. `polish` Newton steps repair most of them. Stop criterion: the next Newton step in impulse.
+//   p(tau) = (1 + tau^2)^2 G,  tau = tan((theta - theta_0) / 2),  basis e_0 = stick_T / |stick_T|,
+//   J e_0
+// Closed form loses digits where roots meet or q_4 vanishes (nearly isotropic G): that is the
+// method's weakness, so its failures are reported. `polish` Newton steps repair most of them. Stop
+// criterion: the next Newton step in impulse.
 #pragma once
 #include "contact/halley.h"
 #include "contact/slip.h"
@@ -15,7 +18,8 @@ inline double largest_cubic_root(double c2, double c1, double c0) {
   const double q = (c2 * c2 - 3 * c1) / 9, r = (2 * c2 * c2 * c2 - 9 * c2 * c1 + 27 * c0) / 54;
   const double q3 = q * q * q;
   if (r * r < q3) {
-    // Three real roots -2 sqrt(q) cos((phi + 2 pi k) / 3) - c2 / 3, phi in [0, pi]; the largest is k = -1 or 1.
+    // Three real roots -2 sqrt(q) cos((phi + 2 pi k) / 3) - c2 / 3, phi in [0, pi]; the largest is
+    // k = -1 or 1.
     const double phi = acos(r / sqrt(q3)) / 3, root = sqrt(q);
     double sine, c_minus, c_plus;
     sincos(phi - kThirdTurn, sine, c_minus);
@@ -59,11 +63,12 @@ STICKSLIP_INLINE double quartic_step(const double q[5], double t) {
 }
 
 template <bool kMaxDissipation>
-inline SlipSolution solve_quartic(const LocalContact<double>& k, const Reduced<double>& reduced, double tolerance,
-                                  int polish = 2) {
+inline SlipSolution solve_quartic(const LocalContact<double>& k, const Reduced<double>& reduced,
+                                  double tolerance, int polish = 2) {
   const SlipProblem p = slip_problem(k, reduced);
   const double length = 1 / sqrt(p.stick_x * p.stick_x + p.stick_y * p.stick_y);
-  const SlipQuartic<double> s = slip_quartic<kMaxDissipation>(k, reduced, p.stick_x * length, p.stick_y * length);
+  const SlipQuartic<double> s =
+      slip_quartic<kMaxDissipation>(k, reduced, p.stick_x * length, p.stick_y * length);
   const double coefficients[5] = {s.q0, s.q1, s.q2, s.q3, s.q4};
   double roots[4];
   const int count = quartic_roots(coefficients, roots);
@@ -81,8 +86,10 @@ inline SlipSolution solve_quartic(const LocalContact<double>& k, const Reduced<d
     q.r = p.mu * p.a / q.d;
     double value;
     if constexpr (!kMaxDissipation) {
-      // Sliding must oppose friction, v_T = -alpha e with alpha >= 0; of several solutions the one nearest to sticking.
-      const double vx = p.sxx * q.r * q.x + p.sxy * q.r * q.y + p.bx, vy = p.sxy * q.r * q.x + p.syy * q.r * q.y + p.by;
+      // Sliding must oppose friction, v_T = -alpha e with alpha >= 0; of several solutions the one
+      // nearest to sticking.
+      const double vx = p.sxx * q.r * q.x + p.sxy * q.r * q.y + p.bx,
+                   vy = p.sxy * q.r * q.x + p.syy * q.r * q.y + p.by;
       value = -(vx * q.x + vy * q.y);
       if (value < 0) continue;
     } else {
@@ -91,10 +98,12 @@ inline SlipSolution solve_quartic(const LocalContact<double>& k, const Reduced<d
     if (value < best_value) best_value = value, best = q, best_tau = t, found = true;
   }
   if (!found) return slip_solution(p, best, 1, false);
-  // What another Newton step would change, as an impulse (C14): |d lambda / d theta| = r |e + mu w| |(1, w)| / d at most.
+  // What another Newton step would change, as an impulse (C14): |d lambda / d theta| = r |e + mu w|
+  // |(1, w)| / d at most.
   const double turn = 2 * abs(quartic_step(coefficients, best_tau)) / (1 + best_tau * best_tau);
   const double nx = best.x + p.mu * p.wx, ny = best.y + p.mu * p.wy;
-  const double speed = best.r / best.d * sqrt((nx * nx + ny * ny) * (1 + p.wx * p.wx + p.wy * p.wy));
+  const double speed =
+      best.r / best.d * sqrt((nx * nx + ny * ny) * (1 + p.wx * p.wx + p.wy * p.wy));
   return slip_solution(p, best, 1, turn * speed <= tolerance);
 }
 

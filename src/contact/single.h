@@ -1,4 +1,5 @@
-// One contact, any method: open, stick and mu = 0 are settled here, a slip goes to the chosen method.
+// One contact, any method: open, stick and mu = 0 are settled here, a slip goes to the chosen
+// method.
 #pragma once
 #include "contact/bisection.h"
 #include "contact/golden_section.h"
@@ -12,10 +13,12 @@ inline constexpr int kHalleyCap = 80;
 
 enum class Method { kHalley, kBisection, kGoldenSection, kQuartic };
 
-/// The impulse [N s] of one contact whose velocity without it is c [m/s]. `evaluations` is 0 when it opens or sticks.
-/// Tolerance: kHalley: residual velocity [m/s]; the others: impulse interval [N s].
+/// The impulse [N s] of one contact whose velocity without it is c [m/s]. `evaluations` is 0 when
+/// it opens or sticks. Tolerance: kHalley: residual velocity [m/s]; the others: impulse interval [N
+/// s].
 template <Method method, bool kMaxDissipation>
-STICKSLIP_INLINE SlipSolution solve_single(const LocalContact<double>& k, const double c[3], double tolerance) {
+STICKSLIP_INLINE SlipSolution solve_single(const LocalContact<double>& k, const double c[3],
+                                           double tolerance) {
   const Reduced<double> r = reduce(k, c[0], c[1], c[2]);
   if (r.stick) return {r.x, r.y, r.z, 0, true};
   if (!r.slip) return {0, 0, 0, 0, true};
@@ -53,10 +56,14 @@ inline void with_method(Method method, bool max_dissipation, F&& f) {
       f(tag, LawTag<false>{});
   };
   switch (method) {
-    case Method::kHalley: return law(MethodTag<Method::kHalley>{});
-    case Method::kBisection: return law(MethodTag<Method::kBisection>{});
-    case Method::kGoldenSection: return law(MethodTag<Method::kGoldenSection>{});
-    case Method::kQuartic: return law(MethodTag<Method::kQuartic>{});
+    case Method::kHalley:
+      return law(MethodTag<Method::kHalley>{});
+    case Method::kBisection:
+      return law(MethodTag<Method::kBisection>{});
+    case Method::kGoldenSection:
+      return law(MethodTag<Method::kGoldenSection>{});
+    case Method::kQuartic:
+      return law(MethodTag<Method::kQuartic>{});
   }
 }
 

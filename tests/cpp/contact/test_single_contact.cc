@@ -1,7 +1,8 @@
 // Every single-contact method on 1e5 random problems of each of four families.
 //
-// Oracles: for maximum dissipation a dense search over the angle of the sliding impulse, refined with energy values in
-// long double (no gradient, no quartic); for Coulomb's law the natural map. Failures are counted, not skipped.
+// Oracles: for maximum dissipation a dense search over the angle of the sliding impulse, refined
+// with energy values in long double (no gradient, no quartic); for Coulomb's law the natural map.
+// Failures are counted, not skipped.
 #include "check.h"
 #include "contact/residual.h"
 #include "contact/single.h"
@@ -16,19 +17,21 @@ using scenes::SingleContact;
 namespace {
 
 constexpr int kCount = 100000;
-constexpr ContactFamily kFamilies[] = {ContactFamily::kNearDiagonal, ContactFamily::kWishart, ContactFamily::kRobotFoot,
-                                       ContactFamily::kIllConditioned};
+constexpr ContactFamily kFamilies[] = {ContactFamily::kNearDiagonal, ContactFamily::kWishart,
+                                       ContactFamily::kRobotFoot, ContactFamily::kIllConditioned};
 constexpr const char* kMethodNames[] = {"halley", "bisection", "golden_section", "quartic"};
 
 LocalContact<double> local(const SingleContact& p) {
   LocalContact<double> k;
-  k.xx = p.G[0], k.xy = p.G[1], k.xz = p.G[2], k.yy = p.G[4], k.yz = p.G[5], k.zz = p.G[8], k.mu = p.mu;
+  k.xx = p.G[0], k.xy = p.G[1], k.xz = p.G[2], k.yy = p.G[4], k.yz = p.G[5], k.zz = p.G[8],
+  k.mu = p.mu;
   contact::prepare(k);
   return k;
 }
 void velocity(const SingleContact& p, const double lambda[3], double v[3]) {
   for (int i = 0; i < 3; ++i)
-    v[i] = p.c[i] + p.G[3 * i] * lambda[0] + p.G[3 * i + 1] * lambda[1] + p.G[3 * i + 2] * lambda[2];
+    v[i] =
+        p.c[i] + p.G[3 * i] * lambda[0] + p.G[3 * i + 1] * lambda[1] + p.G[3 * i + 2] * lambda[2];
 }
 double norm(const double v[3]) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 
@@ -54,21 +57,24 @@ Search brute_force(const SingleContact& p) {
   static std::vector<double> cosines, sines;
   if (cosines.empty())
     for (int i = 0; i < kGrid; ++i)
-      cosines.push_back(std::cos(2 * M_PI * i / kGrid)), sines.push_back(std::sin(2 * M_PI * i / kGrid));
-  const double Wx = p.mu * double(wx), Wy = p.mu * double(wy), ma = p.mu * double(a), Sxx = sxx, Sxy = sxy, Syy = syy,
-               Bx = bx, By = by;
+      cosines.push_back(std::cos(2 * M_PI * i / kGrid)),
+          sines.push_back(std::sin(2 * M_PI * i / kGrid));
+  const double Wx = p.mu * double(wx), Wy = p.mu * double(wy), ma = p.mu * double(a), Sxx = sxx,
+               Sxy = sxy, Syy = syy, Bx = bx, By = by;
   double best = 1e300;
   int at = 0;
   for (int i = 0; i < kGrid; ++i) {
     const double d = 1 + Wx * cosines[i] + Wy * sines[i];
     const double lx = ma / d * cosines[i], ly = ma / d * sines[i];
-    const double e = d > 0 ? 0.5 * (Sxx * lx * lx + Syy * ly * ly) + Sxy * lx * ly + Bx * lx + By * ly : 1e300;
+    const double e =
+        d > 0 ? 0.5 * (Sxx * lx * lx + Syy * ly * ly) + Sxy * lx * ly + Bx * lx + By * ly : 1e300;
     if (e < best) best = e, at = i;
   }
   // Golden section between the neighbors of the best grid point.
   const Real ratio = 0.618033988749894848204586834L;
   Real lo = 2 * M_PIl * (at - 1) / kGrid, hi = 2 * M_PIl * (at + 1) / kGrid;
-  Real x1 = hi - ratio * (hi - lo), x2 = lo + ratio * (hi - lo), e1 = energy(x1, nullptr), e2 = energy(x2, nullptr);
+  Real x1 = hi - ratio * (hi - lo), x2 = lo + ratio * (hi - lo), e1 = energy(x1, nullptr),
+       e2 = energy(x2, nullptr);
   for (int i = 0; i < 48; ++i) {
     if (e1 < e2)
       hi = x2, x2 = x1, e2 = e1, x1 = hi - ratio * (hi - lo), e1 = energy(x1, nullptr);
@@ -97,30 +103,35 @@ struct Count {
 };
 
 void print(ContactFamily f, Method m, const char* law, const Count& n) {
-  std::printf("  %-15s %-14s %-15s wrong %5d  not converged %5d  evaluations %5.2f  worst %.1e\n", scenes::family_name(f),
-              kMethodNames[int(m)], law, n.wrong, n.unconverged, n.evaluations / std::max(n.slip, 1), n.worst);
+  std::printf("  %-15s %-14s %-15s wrong %5d  not converged %5d  evaluations %5.2f  worst %.1e\n",
+              scenes::family_name(f), kMethodNames[int(m)], law, n.wrong, n.unconverged,
+              n.evaluations / std::max(n.slip, 1), n.worst);
 }
 
-/// A slip of the maximum dissipation law is right if it is the brute-force impulse to 10 tolerances (|lambda| is 1 N s),
-/// or, where the problem's condition hides that, if its velocity along the conic is within the tolerance and its energy
-/// exceeds the search's by no more than that velocity explains.
-bool matches(const SingleContact& p, const LocalContact<double>& k, const double lambda[3], const Search& s, double tolerance,
-             double& error) {
-  const double d[3] = {lambda[0] - double(s.lambda[0]), lambda[1] - double(s.lambda[1]), lambda[2] - double(s.lambda[2])};
+/// A slip of the maximum dissipation law is right if it is the brute-force impulse to 10 tolerances
+/// (|lambda| is 1 N s), or, where the problem's condition hides that, if its velocity along the
+/// conic is within the tolerance and its energy exceeds the search's by no more than that velocity
+/// explains.
+bool matches(const SingleContact& p, const LocalContact<double>& k, const double lambda[3],
+             const Search& s, double tolerance, double& error) {
+  const double d[3] = {lambda[0] - double(s.lambda[0]), lambda[1] - double(s.lambda[1]),
+                       lambda[2] - double(s.lambda[2])};
   error = norm(d);
   if (error <= 10 * tolerance) return true;
   double v[3], cone = std::hypot(lambda[0], lambda[1]) - p.mu * lambda[2];
   velocity(p, lambda, v);
-  const double r = std::hypot(lambda[0], lambda[1]), nx = lambda[0] / r + p.mu * k.wx, ny = lambda[1] / r + p.mu * k.wy;
+  const double r = std::hypot(lambda[0], lambda[1]), nx = lambda[0] / r + p.mu * k.wx,
+               ny = lambda[1] / r + p.mu * k.wy;
   const double along = std::fabs(v[1] * nx - v[0] * ny) / std::hypot(nx, ny);
   const double allowed = tolerance * (norm(p.c.data()) + 3 * k.scale);
   const double rounding = 1e-15 * norm(p.c.data());  // of the impulse, whose norm is 1
-  return energy_excess(p, lambda, s) <= allowed * error + rounding && along <= allowed && std::fabs(v[2]) <= allowed &&
-         std::fabs(cone) <= tolerance;
+  return energy_excess(p, lambda, s) <= allowed * error + rounding && along <= allowed &&
+         std::fabs(v[2]) <= allowed && std::fabs(cone) <= tolerance;
 }
 
 template <Method method>
-Count run_max_dissipation(const std::vector<SingleContact>& problems, const std::vector<Search>& searches, double tolerance) {
+Count run_max_dissipation(const std::vector<SingleContact>& problems,
+                          const std::vector<Search>& searches, double tolerance) {
   Count n;
   for (std::size_t i = 0; i < problems.size(); ++i) {
     const SingleContact& p = problems[i];
@@ -159,7 +170,8 @@ Count run_coulomb(const std::vector<SingleContact>& problems, double tolerance) 
     velocity(p, lambda, v);
     // The others stop at an impulse, which the block turns into a velocity.
     const double residual = contact::natural_map_residual(k, v, lambda);
-    const double allowed = method == Method::kHalley ? 2 * tolerance * speed : tolerance * (speed + 3 * k.scale);
+    const double allowed =
+        method == Method::kHalley ? 2 * tolerance * speed : tolerance * (speed + 3 * k.scale);
     n.unconverged += !s.converged;
     n.wrong += !(residual <= allowed);
     n.worst = std::fmax(n.worst, residual / allowed);
@@ -171,7 +183,8 @@ Count run_coulomb(const std::vector<SingleContact>& problems, double tolerance) 
 
 bool mixed(const Count& n) {
   const int total = n.open + n.stick + n.slip;
-  return total == kCount && n.open >= 0.15 * total && n.stick >= 0.15 * total && n.slip >= 0.15 * total;
+  return total == kCount && n.open >= 0.15 * total && n.stick >= 0.15 * total &&
+         n.slip >= 0.15 * total;
 }
 
 }  // namespace
@@ -185,8 +198,10 @@ TEST(MaxDissipationMatchesBruteForceOnEveryFamily) {
     for (const double tolerance : {1e-6, 1e-9}) {
       std::printf("  tolerance %g\n", tolerance);
       const Count halley = run_max_dissipation<Method::kHalley>(problems, searches, tolerance);
-      const Count bisection = run_max_dissipation<Method::kBisection>(problems, searches, tolerance);
-      const Count golden = run_max_dissipation<Method::kGoldenSection>(problems, searches, tolerance);
+      const Count bisection =
+          run_max_dissipation<Method::kBisection>(problems, searches, tolerance);
+      const Count golden =
+          run_max_dissipation<Method::kGoldenSection>(problems, searches, tolerance);
       const Count quartic = run_max_dissipation<Method::kQuartic>(problems, searches, tolerance);
       print(f, Method::kHalley, "max_dissipation", halley);
       print(f, Method::kBisection, "max_dissipation", bisection);

@@ -62,10 +62,12 @@ TEST(LanesOfAtan2AndAcosEqualTheScalarBitForBit) {
   using P = stickslip::Pack<double, 4>;
   for (int i = 0; i < 10000; ++i) {
     P y, x;
-    for (int k = 0; k < 4; ++k) stickslip::set_lane(y, k, uniform(-2, 2)), stickslip::set_lane(x, k, uniform(-2, 2));
+    for (int k = 0; k < 4; ++k)
+      stickslip::set_lane(y, k, uniform(-2, 2)), stickslip::set_lane(x, k, uniform(-2, 2));
     const P a = stickslip::atan2(y, x), b = stickslip::acos(x);
     for (int k = 0; k < 4; ++k) {
-      CHECK(stickslip::get_lane(a, k) == stickslip::atan2(stickslip::get_lane(y, k), stickslip::get_lane(x, k)));
+      CHECK(stickslip::get_lane(a, k) ==
+            stickslip::atan2(stickslip::get_lane(y, k), stickslip::get_lane(x, k)));
       CHECK(stickslip::get_lane(b, k) == stickslip::acos(stickslip::get_lane(x, k)));
     }
   }

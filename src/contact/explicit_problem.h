@@ -1,0 +1,210 @@
+// A dense contact problem v = G lambda + c whose velocities are kept up to date while impulses
+// change.
+//
+// Owns no memory: the caller hands in the arrays and a workspace, so a step can solve without
+// allocating. The stopping tests of the sweeps are here too; all are functions of (G, c, mu,
+// lambda) alone once `refresh_velocity` has been called.
+#pragma once
+#include "contact/residual.h"
+#include "contact/single.h"
+
+namespace stickslip::contact {
+
+struct ExplicitProblem {
+  int n = 0;                   // contacts
+  const double* G = nullptr;   // (3n, 3n) row-major, symmetric [1/kg]
+  const double* c = nullptr;   // (3n) [m/s]
+  const double* mu = nullptr;  // (n) [1]
+  double* lambda = nullptr;    // (3n) in: start, out: solution [N s]
+  // Workspace.
+  LocalContact<double>* local = nullptr;  // (n)
+  double* v = nullptr;                    // (3n) G lambda + c [m/s]
+
+  /// Doubles that `attach` needs for n contacts.
+  static constexpr long workspace_size(int n) {
+    return n * static_cast<long>(sizeof(LocalContact<double>) / sizeof(double)) + 3L * n;
+  }
+  void attach(double* workspace) {
+    local = reinterpret_cast<LocalContact<double>*>(workspace);
+    v = workspace + n * static_cast<long>(sizeof(LocalContact<double>) / sizeof(double));
+  }
+  const double* row(int r) const { return G + static_cast<long>(r) * 3 * n; }
+};
+
+/// Friction above this counts as this: beyond, the rounding of v_T times mu would fill the
+/// residual.
+inline constexpr double kMaxFriction = 1e4;
+
+/// v = G lambda + c from scratch.
+inline void refresh_velocity(ExplicitProblem& p) {
+  const int m = 3 * p.n;
+  for (int r = 0; r < m; ++r) {
+    const double* g = p.row(r);
+    double sum = p.c[r];
+    for (int j = 0; j < m; ++j) sum = madd(g[j], p.lambda[j], sum);
+    p.v[r] = sum;
+  }
+}
+
+/// Local blocks and velocities; call once G, c, mu and lambda are set.
+inline void prepare(ExplicitProblem& p) {
+  for (int i = 0; i < p.n; ++i) {
+    LocalContact<double>& k = p.local[i];
+    const double *x = p.row(3 * i) + 3 * i, *y = p.row(3 * i + 1) + 3 * i,
+                 *z = p.row(3 * i + 2) + 3 * i;
+    k.xx = x[0], k.xy = x[1], k.xz = x[2], k.yy = y[1], k.yz = y[2], k.zz = z[2];
+    k.mu = min(p.mu[i], kMaxFriction);
+    prepare(k);
+  }
+  refresh_velocity(p);
+}
+
+/// c_i of (C4): the velocity of contact i without its own impulse, from the newest impulses of all
+/// others.
+STICKSLIP_INLINE void velocity_without_own(const ExplicitProblem& p, int i, double c[3]) {
+  double own[3];
+  apply_block(p.local[i], p.lambda + 3 * i, own);
+  for (int r = 0; r < 3; ++r) c[r] = p.v[3 * i + r] - own[r];
+}
+
+/// Changes one impulse component and with it all velocities (row = column: G is symmetric).
+STICKSLIP_INLINE void add_component(ExplicitProblem& p, int r, double d) {
+  const int m = 3 * p.n;
+  const double* __restrict__ g = p.row(r);
+  double* __restrict__ v = p.v;
+  p.lambda[r] += d;
+  for (int j = 0; j < m; ++j) v[j] = madd(g[j], d, v[j]);
+}
+
+/// Changes the impulse of contact i.
+STICKSLIP_INLINE void add_impulse(ExplicitProblem& p, int i, const double d[3]) {
+  const int m = 3 * p.n;
+  const double* __restrict__ x = p.row(3 * i), * __restrict__ y = x + m, * __restrict__ z = y + m;
+  double* __restrict__ v = p.v;
+  for (int r = 0; r < 3; ++r) p.lambda[3 * i + r] += d[r];
+  const double d0 = d[0], d1 = d[1], d2 = d[2];
+  for (int j = 0; j < m; ++j) v[j] = madd(x[j], d0, madd(y[j], d1, madd(z[j], d2, v[j])));
+}
+
+/// Residual of contact i [m/s], (C3) for Coulomb's law, (C26) for maximum dissipation: |G_ii
+/// (lambda_i - exact_i)| with the others held, and the speed of approach where the contact cannot
+/// push.
+inline double contact_residual(const ExplicitProblem& p, int i, bool max_dissipation) {
+  const LocalContact<double>& k = p.local[i];
+  const double *v = p.v + 3 * i, *lambda = p.lambda + 3 * i;
+  if (!max_dissipation) {
+    // An impulse so large that the velocity drowns in its rounding certifies nothing.
+    const double size = sqrt(lambda[0] * lambda[0] + lambda[1] * lambda[1] + lambda[2] * lambda[2]);
+    return natural_map_residual(k, v, lambda) + 4e-16 * k.scale * size;
+  }
+  double c[3], own[3];
+  velocity_without_own(p, i, c);
+  const double speed = sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
+  const SlipSolution s = solve_single<Method::kHalley, true>(k, c, 1e-15 * speed);
+  const double d[3] = {lambda[0] - s.x, lambda[1] - s.y, lambda[2] - s.z};
+  apply_block(k, d, own);
+  const double approach = k.inv_zz > 0 ? 0.0 : max(-v[2], 0.0);
+  return sqrt(own[0] * own[0] + own[1] * own[1] + own[2] * own[2] + approach * approach);
+}
+
+/// The largest of them; NaN counts as infinite.
+inline double largest_residual(const ExplicitProblem& p, bool max_dissipation) {
+  double worst = 0;
+  for (int i = 0; i < p.n; ++i) {
+    const double e = contact_residual(p, i, max_dissipation);
+    if (!(e <= worst)) worst = e == e ? e : __builtin_inf();
+  }
+  return worst;
+}
+
+/// What contact i violates of its law [m/s], without solving anything: the least of what it would
+/// violate as an open, a sticking and a sliding contact (impulses times `scale`). Zero exactly at a
+/// solution, under either law.
+inline double contact_violation(const ExplicitProblem& p, int i, bool max_dissipation) {
+  const LocalContact<double>& k = p.local[i];
+  const double *v = p.v + 3 * i, *l = p.lambda + 3 * i;
+  const double tangential = sqrt(l[0] * l[0] + l[1] * l[1]), edge = k.mu * l[2] - tangential;
+  const double open = k.scale * sqrt(tangential * tangential + l[2] * l[2]) + max(-v[2], 0.0);
+  const double stick = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) + k.scale * max(-edge, 0.0);
+  // Sliding: v_T against n = e + kappa mu w, and not along it. An impulse that hardly counts may
+  // point anywhere: an angle violates |v_T| times it or scale |lambda_T| times it, the lesser.
+  double turn = 0;
+  if (tangential > 0) {
+    const double bend = max_dissipation ? k.mu : 0;
+    const double nx = l[0] / tangential + bend * k.wx, ny = l[1] / tangential + bend * k.wy;
+    const double length = max(sqrt(nx * nx + ny * ny), 1e-300);
+    const double along = abs(v[1] * nx - v[0] * ny) / length;
+    const double push = max(v[0] * nx + v[1] * ny, 0.0) / length;
+    const double speed = max(sqrt(v[0] * v[0] + v[1] * v[1]), 1e-300);
+    turn = (along + push) * min(1.0, k.scale * tangential / speed);
+  }
+  const double slip = k.scale * abs(edge) + max(-l[2], 0.0) * k.scale + abs(v[2]) + turn;
+  return min(open, min(stick, slip));
+}
+
+/// "The exact violations of the physical constraints", added ([Hwangbo 2018] section V.C) [m/s].
+inline double violation_sum(const ExplicitProblem& p, bool max_dissipation) {
+  double sum = 0;
+  for (int i = 0; i < p.n; ++i) sum += contact_violation(p, i, max_dissipation);
+  return sum;
+}
+
+/// What ends a sweep loop once it is at most the tolerance.
+enum class StopTest {
+  kResidual,      ///< the largest contact residual [m/s]: the project's certificate
+  kViolationSum,  ///< the paper's test for per-contact iteration [m/s]
+  kUpdateSum,     ///< the paper's test for PGS: impulse updates [N s] and penetration velocities
+                  ///< [m/s], added
+};
+
+struct SweepOptions {
+  bool max_dissipation = false;
+  Method method = Method::kHalley;  ///< per_contact only
+  StopTest stop = StopTest::kResidual;
+  double tolerance = 1e-9;  ///< of the stop test
+  int max_sweeps = 1000;
+  double alpha = 1, alpha_min = 0.7,
+         gamma = 1;  ///< [Hwangbo 2018] Algorithm 2; PGS: alpha of eq. 18, constant
+  double local_tolerance =
+      0;  ///< of the single-contact method [N s]; 0: a tenth of what `tolerance` needs
+  double* history = nullptr;  ///< (max_sweeps) value of the stop test after each sweep, or none
+};
+
+struct SweepResult {
+  int sweeps = 0;
+  double error = 0;  ///< of the stop test
+  bool converged = false;
+};
+
+/// The stop test on the velocities that the sweep kept; `updates` is its own sum for kUpdateSum.
+inline double stop_error(const ExplicitProblem& p, const SweepOptions& o, double updates) {
+  if (o.stop == StopTest::kUpdateSum) {
+    for (int i = 0; i < p.n; ++i) updates += max(-p.v[3 * i + 2], 0.0);
+    return updates;
+  }
+  if (o.stop == StopTest::kViolationSum) return violation_sum(p, o.max_dissipation);
+  if (o.max_dissipation) {
+    // The residual costs a solve per contact; it is worth that only where the violations are small
+    // already.
+    double worst = 0;
+    for (int i = 0; i < p.n; ++i) worst = max(worst, contact_violation(p, i, true));
+    if (worst > o.tolerance) return worst;
+  }
+  return largest_residual(p, o.max_dissipation);
+}
+
+/// Ends a sweep: true if the loop is done. Convergence counts only with velocities computed from
+/// scratch, so that what the sweeps accumulated in rounding cannot hide.
+inline bool end_sweep(ExplicitProblem& p, const SweepOptions& o, double updates, SweepResult& r) {
+  r.error = stop_error(p, o, updates);
+  if (r.error <= o.tolerance) {
+    refresh_velocity(p);
+    r.error = stop_error(p, o, updates);
+  }
+  if (o.history) o.history[r.sweeps] = r.error;
+  ++r.sweeps;
+  r.converged = r.error <= o.tolerance;
+  return r.converged || !(r.error < 1e300);
+}
+
+}  // namespace stickslip::contact

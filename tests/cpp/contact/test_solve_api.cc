@@ -1,0 +1,275 @@
+// The public contact API: bad input, degenerate problems, invariances, truthful status.
+#include <stickslip/errors.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "check.h"
+#include "contact/dense_problems.h"
+
+using namespace stickslip;
+
+namespace {
+
+ContactProblem block() { return {{2, 0.5, 0.3, 0.5, 1, -0.2, 0.3, -0.2, 1.5}, {1, -2, -3}, {0.5}}; }
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+bool finite(const SolveResult& r) {
+  const auto all = [](const std::vector<double>& x) {
+    return std::all_of(x.begin(), x.end(), [](double e) { return std::isfinite(e); });
+  };
+  return all(r.impulse) && all(r.velocity) && all(r.contact_residuals) && std::isfinite(r.residual);
+}
+
+/// Two rigid copies of each contact of a problem: G is singular.
+ContactProblem duplicated(const ContactProblem& p) {
+  const int n = p.num_contacts();
+  ContactProblem d;
+  for (int i = 0; i < 2 * n; ++i) {
+    d.friction.push_back(p.friction[i / 2]);
+    for (int r = 0; r < 3; ++r) d.free_velocity.push_back(p.free_velocity[3 * (i / 2) + r]);
+  }
+  for (int i = 0; i < 6 * n; ++i)
+    for (int j = 0; j < 6 * n; ++j)
+      d.delassus.push_back(p.delassus[(3 * (i / 6) + i % 3) * 3 * n + 3 * (j / 6) + j % 3]);
+  return d;
+}
+
+}  // namespace
+
+TEST(BadProblemsAreNamedWithTheirFirstOffendingEntry) {
+  ContactProblem p = block();
+  p.delassus.pop_back();
+  CHECK_THROWS(p.validate(), ModelError, "delassus has 8 values; 9 expected");
+  p = block(), p.free_velocity.push_back(0);
+  CHECK_THROWS(p.validate(), ModelError, "free_velocity has 4 values; 3 expected");
+  p = block(), p.delassus[5] = kNan;
+  CHECK_THROWS(p.validate(), ModelError, "delassus[1, 2] is nan");
+  p = block(), p.delassus[1] = 0.6;
+  CHECK_THROWS(p.validate(), ModelError, "not symmetric: [1, 0] and [0, 1] differ by 0.1");
+  p = block(), p.delassus[4] = -1;
+  CHECK_THROWS(p.validate(), ModelError, "delassus[1, 1] is -1");
+  p = block(), p.delassus[1] = p.delassus[3] = 5;
+  CHECK_THROWS(p.validate(), ModelError, "indefinite");
+  p = block(), p.free_velocity[2] = kInfinity;
+  CHECK_THROWS(p.validate(), ModelError, "free_velocity[2] is inf");
+  p = block(), p.friction[0] = -0.1;
+  CHECK_THROWS(p.validate(), ModelError, "friction[0] is -0.1");
+  p = block(), p.friction[0] = kNan;
+  CHECK_THROWS(p.validate(), ModelError, "friction[0] is nan");
+}
+
+TEST(BadOptionsAndImpulsesAreNamed) {
+  const ContactProblem p = block();
+  SolveOptions o;
+  o.tolerance = 0;
+  CHECK_THROWS(solve(p, o), ModelError, "tolerance");
+  o = {}, o.max_sweeps = 0;
+  CHECK_THROWS(solve(p, o), ModelError, "max_sweeps");
+  o = {}, o.alpha = kNan;
+  CHECK_THROWS(solve(p, o), ModelError, "alpha");
+  o = {}, o.method = SolveMethod::kPgs, o.law = FrictionLaw::kMaxDissipation;
+  CHECK_THROWS(solve(p, o), ModelError, "pgs solves law coulomb only");
+  o = {}, o.method = SolveMethod::kPerContact,
+  o.single_contact = SingleContactMethod::kGoldenSection;
+  CHECK_THROWS(solve(p, o), ModelError, "golden_section minimizes the energy");
+  CHECK_THROWS(solve(p, {}, {1, 2}), ModelError, "the warm start has 2 values; 3 expected");
+  CHECK_THROWS(solve(p, {}, {1, kNan, 2}), ModelError, "the warm start[1] is nan");
+  CHECK_THROWS(residual(p, {1}), ModelError, "the impulse has 1 values");
+  SingleContactOptions s;
+  s.method = SingleContactMethod::kGoldenSection;
+  CHECK_THROWS(solve_contact(p.delassus.data(), p.free_velocity.data(), 0.5, s), ModelError,
+               "golden_section");
+}
+
+TEST(AProblemWithoutContactsIsSolved) {
+  const SolveResult r = solve({}, {});
+  CHECK(r.status == SolveStatus::kConverged && r.impulse.empty() && r.residual == 0);
+}
+
+TEST(AutoSolvesEveryRobotScene) {
+  for (int scene = 0; scene < problems::kNumScenes; ++scene) {
+    problems::Random rng(31 + scene);
+    int unconverged = 0, sweeps = 0;
+    for (int i = 0; i < 300; ++i) {
+      const SolveResult r = solve(problems::dense(problems::random_robot_problem(scene, rng)));
+      unconverged += r.status != SolveStatus::kConverged, sweeps += r.sweeps;
+    }
+    std::printf("  %-26s unconverged %d of 300, sweeps %.1f\n", problems::scene_name(scene),
+                unconverged, sweeps / 300.0);
+    CHECK(unconverged == 0);
+  }
+}
+
+TEST(AutoSolvesMaximumDissipationOnFourFeet) {
+  problems::Random rng(32);
+  SolveOptions o;
+  o.law = FrictionLaw::kMaxDissipation;
+  for (int i = 0; i < 200; ++i)
+    CHECK(
+        solve(problems::dense(problems::random_robot_problem(problems::kImpact, rng)), o).status ==
+        SolveStatus::kConverged);
+}
+
+TEST(TowersAndTheirMassRatiosAreSolved) {
+  for (const double ratio : {1.0, 100.0, 1000.0})
+    for (const int copies : {1, 2}) {
+      const ContactProblem p = problems::tower({1, ratio, 1}, 0.5, 2, copies);
+      const SolveResult r = solve(p);
+      std::printf("  1 : %g : 1, %d copies: residual %.1e, sweeps %d, Newton steps %d\n", ratio,
+                  copies, r.residual, r.sweeps, r.newton_steps);
+      CHECK(r.status == SolveStatus::kConverged);
+      // The ground carries the weight.
+      double weight = 0;
+      for (int i = 0; i < 4 * copies; ++i) weight += r.impulse[3 * i + 2];
+      CHECK_NEAR(weight, (2 + ratio) * 9.81e-3, 1e-8 * ratio);
+    }
+}
+
+TEST(DuplicatedContactsGiveTheSameVelocities) {
+  problems::Random rng(33);
+  for (int i = 0; i < 50; ++i) {
+    const ContactProblem p =
+        problems::dense(problems::random_robot_problem(problems::kImpact, rng));
+    const SolveResult a = solve(p), b = solve(duplicated(p));
+    CHECK(a.status == SolveStatus::kConverged && b.status == SolveStatus::kConverged);
+    for (int k = 0; k < p.num_contacts(); ++k)
+      for (int r = 0; r < 3; ++r) CHECK_NEAR(a.velocity[3 * k + r], b.velocity[6 * k + r], 1e-6);
+  }
+}
+
+TEST(FrictionMayBeZeroOrInfinite) {
+  for (const SolveMethod method : {SolveMethod::kAuto, SolveMethod::kPerContact, SolveMethod::kPgs})
+    for (const double mu : {0.0, 1e-12, 1e6, 1e300, kInfinity}) {
+      ContactProblem p = block();
+      p.friction[0] = mu;
+      SolveOptions o;
+      o.method = method, o.max_sweeps = 100000;
+      const SolveResult r = solve(p, o);
+      CHECK(finite(r));
+      CHECK(r.status == SolveStatus::kConverged);
+      if (mu == 0)
+        CHECK(r.impulse[0] == 0 && r.impulse[1] == 0 && std::fabs(r.impulse[2] - 2) < 1e-8);
+      if (mu > 1) CHECK_NEAR(problems::largest(r.velocity), 0, 1e-8);
+    }
+}
+
+TEST(AContactThatCannotPushIsReported) {
+  ContactProblem p{{2, 0.5, 0, 0.5, 1, 0, 0, 0, 0}, {1, -2, -3}, {0.5}};
+  for (const SolveMethod method : {SolveMethod::kAuto, SolveMethod::kPerContact})
+    for (const FrictionLaw law : {FrictionLaw::kCoulomb, FrictionLaw::kMaxDissipation}) {
+      SolveOptions o;
+      o.method = method, o.law = law, o.max_sweeps = 20;
+      const SolveResult r = solve(p, o);
+      CHECK(finite(r) && r.status == SolveStatus::kInfeasible && r.residual > 1);
+    }
+  p.free_velocity[2] = 3;  // moving away: nothing is asked of it
+  CHECK(solve(p).status == SolveStatus::kConverged);
+  const ContactProblem none{std::vector<double>(9), {0, 0, -1}, {0.5}};
+  CHECK(finite(solve(none)) && solve(none).status == SolveStatus::kInfeasible);
+}
+
+TEST(AStatusNeverClaimsMoreThanTheResidual) {
+  problems::Random rng(34);
+  for (int i = 0; i < 100; ++i) {
+    const ContactProblem p =
+        problems::dense(problems::random_robot_problem(problems::kDropTwelve, rng));
+    for (const SolveMethod method :
+         {SolveMethod::kAuto, SolveMethod::kPerContact, SolveMethod::kPgs}) {
+      SolveOptions o;
+      o.method = method, o.max_sweeps = 3, o.tolerance = 1e-10;
+      const SolveResult r = solve(p, o);
+      CHECK(finite(r));
+      CHECK((r.status == SolveStatus::kConverged) ==
+            (problems::largest(residual(p, r.impulse)) <= o.tolerance));
+      CHECK(r.residual <= problems::largest(residual(p, std::vector<double>(r.impulse.size()))));
+    }
+  }
+}
+
+TEST(ScalingMassesScalesImpulses) {
+  problems::Random rng(35);
+  const ContactProblem p = problems::dense(problems::random_robot_problem(problems::kImpact, rng));
+  const SolveResult a = solve(p);
+  for (const double mass : {1e-6, 1e-3, 1e3, 1e6}) {
+    ContactProblem q = p;
+    for (double& x : q.delassus) x /= mass;
+    const SolveResult b = solve(q);
+    CHECK(b.status == SolveStatus::kConverged);
+    for (std::size_t k = 0; k < a.impulse.size(); ++k)
+      CHECK_NEAR(b.impulse[k] / mass, a.impulse[k], 1e-7);
+  }
+}
+
+TEST(TheOrderOfContactsDoesNotMatter) {
+  problems::Random rng(36);
+  const ContactProblem p = problems::dense(problems::random_robot_problem(problems::kImpact, rng));
+  const int n = p.num_contacts(), m = 3 * n;
+  ContactProblem q = p;
+  const auto other = [n](int i) { return 3 * (n - 1 - i / 3) + i % 3; };
+  for (int i = 0; i < m; ++i) {
+    q.free_velocity[i] = p.free_velocity[other(i)], q.friction[i / 3] = p.friction[other(i) / 3];
+    for (int j = 0; j < m; ++j) q.delassus[i * m + j] = p.delassus[other(i) * m + other(j)];
+  }
+  const SolveResult a = solve(p), b = solve(q);
+  for (int i = 0; i < m; ++i) CHECK_NEAR(b.impulse[i], a.impulse[other(i)], 1e-7);
+}
+
+TEST(TheDirectionOfTheTangentialAxesDoesNotMatter) {
+  problems::Random rng(37);
+  const ContactProblem p = problems::dense(problems::random_robot_problem(problems::kImpact, rng));
+  const int m = 3 * p.num_contacts();
+  // R turns each contact frame about its normal: G' = R G R^T, c' = R c, lambda' = R lambda.
+  std::vector<double> R(m * m), half(m * m);
+  for (int i = 0; i < m / 3; ++i) {
+    const double c = std::cos(i + 1.0), s = std::sin(i + 1.0),
+                 block[3][3] = {{c, s, 0}, {-s, c, 0}, {0, 0, 1}};
+    for (int r = 0; r < 3; ++r)
+      for (int k = 0; k < 3; ++k) R[(3 * i + r) * m + 3 * i + k] = block[r][k];
+  }
+  ContactProblem q = p;
+  for (int i = 0; i < m; ++i)
+    for (int j = 0; j < m; ++j)
+      for (int k = 0; k < m; ++k) half[i * m + j] += R[i * m + k] * p.delassus[k * m + j];
+  for (int i = 0; i < m; ++i)
+    for (int j = 0; j < m; ++j) {
+      double sum = 0;
+      for (int k = 0; k < m; ++k) sum += half[i * m + k] * R[j * m + k];
+      q.delassus[i * m + j] = sum;
+    }
+  for (int i = 0; i < m; ++i)
+    for (int j = i; j < m; ++j) q.delassus[j * m + i] = q.delassus[i * m + j];
+  const auto turned = [&](const std::vector<double>& x) {
+    std::vector<double> y(m);
+    for (int i = 0; i < m; ++i)
+      for (int k = 0; k < m; ++k) y[i] += R[i * m + k] * x[k];
+    return y;
+  };
+  q.free_velocity = turned(p.free_velocity);
+  const std::vector<double> a = turned(solve(p).impulse), b = solve(q).impulse;
+  for (int i = 0; i < m; ++i) CHECK_NEAR(b[i], a[i], 1e-7);
+}
+
+TEST(AWarmStartAtTheSolutionStaysThere) {
+  problems::Random rng(38);
+  const ContactProblem p = problems::dense(problems::random_robot_problem(problems::kImpact, rng));
+  SolveOptions o;
+  o.method = SolveMethod::kPerContact;
+  const SolveResult a = solve(p, o), b = solve(p, o, a.impulse);
+  CHECK(a.sweeps > 1 && b.sweeps == 1 && b.status == SolveStatus::kConverged);
+}
+
+TEST(SolveContactAgreesWithSolve) {
+  const ContactProblem p = block();
+  const SolveResult a = solve(p);
+  for (const auto method : {SingleContactMethod::kHalley, SingleContactMethod::kBisection,
+                            SingleContactMethod::kQuartic}) {
+    SingleContactOptions o;
+    o.method = method;
+    const SingleContactResult b =
+        solve_contact(p.delassus.data(), p.free_velocity.data(), p.friction[0], o);
+    CHECK(b.converged && b.evaluations > 0);
+    for (int k = 0; k < 3; ++k) CHECK_NEAR(a.impulse[k], b.impulse[k], 1e-8);
+  }
+}
