@@ -51,7 +51,7 @@ $(VENV)/tools: pyproject.toml
 	touch $@
 
 $(VENV)/installed: $(VENV)/tools $(SOURCES) CMakeLists.txt
-	$(INSTALL) .
+	$(INSTALL) -C cmake.define.STICKSLIP_TESTS=OFF .
 	touch $@
 
 $(VENV)/installed-test: $(VENV)/tools $(SOURCES) $(CXX_TESTS) CMakeLists.txt

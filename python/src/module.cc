@@ -9,7 +9,6 @@ namespace nb = nanobind;
 NB_MODULE(_core, m) {
   m.doc() = "C++ core of stickslip. Use the names of the package `stickslip`; these may change.";
 
-  nb::exception<stickslip::ModelError>(m, "ModelError", PyExc_ValueError);
   nb::register_exception_translator([](const std::exception_ptr& p, void*) {
     try {
       std::rethrow_exception(p);
