@@ -242,6 +242,10 @@ ModelPtr ModelBuilder::build(BaseType base) const {
         model->joints_.push_back(make_joint(joint, parent.body, pose));
       }
     }
+    // Huge offsets may overflow only where they add up.
+    const Pose& placed = frame.body > 0 ? model->joints_[frame.body - 1].pose : frame.pose;
+    if (!finite(placed.position) || !finite(frame.pose.position))
+      fail(link_named(frame.name), "its position overflows");
     frame_of[l] = static_cast<int>(model->frames_.size());
     model->frames_.push_back(frame);
     // Shapes move along, in the order in which the link got them.

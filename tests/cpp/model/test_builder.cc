@@ -186,6 +186,14 @@ TEST(BadNumbersNameTheElement) {
                "link 'arm': its mass");
 }
 
+TEST(OffsetsThatAddUpToInfinityNameTheLink) {
+  ModelBuilder builder("far");
+  for (const char* name : {"base", "a", "b"}) builder.add_link(name, kUnit);
+  builder.add_joint(make("f", "base", "a", LinkJointType::kFixed, {1e308, 0, 0}));
+  builder.add_joint(make("j", "a", "b", LinkJointType::kContinuous, {1e308, 0, 0}));
+  CHECK_THROWS(builder.build(BaseType::kFixed), ModelError, "link 'b': its position overflows");
+}
+
 TEST(BadShapesNameTheLink) {
   ModelBuilder builder = two_links();
   Shape ball;
