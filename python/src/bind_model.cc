@@ -23,8 +23,6 @@ using namespace nb::literals;
 namespace stickslip::python {
 namespace {
 
-// Arrays own their data, so properties that make them say rv_policy::move: the default of a
-// property would tie the array to its object as well, which nanobind refuses.
 ArrayOut to_numpy(const double* values, std::initializer_list<std::size_t> shape) {
   return make_array(shape,
                     [&](std::span<double> to) { std::copy_n(values, to.size(), to.begin()); });

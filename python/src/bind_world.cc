@@ -103,10 +103,14 @@ void bind_records(nb::module_& m) {
       .def_ro("point", &Contact::point)
       .def_ro("gap", &Contact::gap)
       .def_ro("friction", &Contact::friction)
-      .def_prop_ro("position", [](const Contact& c) { return array3(c.position); })
-      .def_prop_ro("normal", [](const Contact& c) { return array3(c.normal); })
-      .def_prop_ro("impulse", [](const Contact& c) { return array3(c.impulse); })
-      .def_prop_ro("velocity", [](const Contact& c) { return array3(c.velocity); });
+      .def_prop_ro(
+          "position", [](const Contact& c) { return array3(c.position); }, nb::rv_policy::move)
+      .def_prop_ro(
+          "normal", [](const Contact& c) { return array3(c.normal); }, nb::rv_policy::move)
+      .def_prop_ro(
+          "impulse", [](const Contact& c) { return array3(c.impulse); }, nb::rv_policy::move)
+      .def_prop_ro(
+          "velocity", [](const Contact& c) { return array3(c.velocity); }, nb::rv_policy::move);
   nb::class_<StepInfo>(m, "StepInfo")
       .def_prop_ro("status", [](const StepInfo& i) { return static_cast<std::uint32_t>(i.status); })
       .def_ro("contacts", &StepInfo::contacts)
@@ -127,8 +131,10 @@ void bind_robot(nb::module_& m) {
   nb::class_<Robot>(m, "Robot")
       .def_prop_ro("name", &Robot::name)
       .def_prop_ro("model", &Robot::model_ptr)
-      .def_prop_ro("q", [](const Robot& r) { return copy_array(r.q()); })
-      .def_prop_ro("u", [](const Robot& r) { return copy_array(r.u()); })
+      .def_prop_ro(
+          "q", [](const Robot& r) { return copy_array(r.q()); }, nb::rv_policy::move)
+      .def_prop_ro(
+          "u", [](const Robot& r) { return copy_array(r.u()); }, nb::rv_policy::move)
       .def(
           "set_state",
           [](Robot& r, const VectorIn& q, const VectorIn& u) {
@@ -137,18 +143,22 @@ void bind_robot(nb::module_& m) {
           "q"_a, "u"_a)
       .def_prop_rw(
           "generalized_force", [](const Robot& r) { return copy_array(r.generalized_force()); },
-          [](Robot& r, const VectorIn& tau) { r.set_generalized_force(span_of(tau)); })
+          [](Robot& r, const VectorIn& tau) { r.set_generalized_force(span_of(tau)); },
+          nb::rv_policy::move)
       .def(
           "set_pd_gains",
           [](Robot& r, const VectorIn& kp, const VectorIn& kd) {
             r.set_pd_gains(span_of(kp), span_of(kd));
           },
           "kp"_a, "kd"_a)
-      .def_prop_ro("pd_kp", [](const Robot& r) { return copy_array(r.pd_kp()); })
-      .def_prop_ro("pd_kd", [](const Robot& r) { return copy_array(r.pd_kd()); })
+      .def_prop_ro(
+          "pd_kp", [](const Robot& r) { return copy_array(r.pd_kp()); }, nb::rv_policy::move)
+      .def_prop_ro(
+          "pd_kd", [](const Robot& r) { return copy_array(r.pd_kd()); }, nb::rv_policy::move)
       .def_prop_rw(
           "pd_target", [](const Robot& r) { return copy_array(r.pd_target()); },
-          [](Robot& r, const VectorIn& target) { r.set_pd_target(span_of(target)); })
+          [](Robot& r, const VectorIn& target) { r.set_pd_target(span_of(target)); },
+          nb::rv_policy::move)
       .def("mass_matrix",
            [](const Robot& r) {
              return make_array({dofs(r), dofs(r)},
@@ -175,9 +185,15 @@ void bind_robot(nb::module_& m) {
       .def("delassus", &delassus, "bodies"_a, "points"_a)
       .def_prop_ro("kinetic_energy", &Robot::kinetic_energy)
       .def_prop_ro("potential_energy", &Robot::potential_energy)
-      .def_prop_ro("center_of_mass", [](const Robot& r) { return array3(r.center_of_mass()); })
-      .def_prop_ro("linear_momentum", [](const Robot& r) { return array3(r.linear_momentum()); })
-      .def_prop_ro("angular_momentum", [](const Robot& r) { return array3(r.angular_momentum()); })
+      .def_prop_ro(
+          "center_of_mass", [](const Robot& r) { return array3(r.center_of_mass()); },
+          nb::rv_policy::move)
+      .def_prop_ro(
+          "linear_momentum", [](const Robot& r) { return array3(r.linear_momentum()); },
+          nb::rv_policy::move)
+      .def_prop_ro(
+          "angular_momentum", [](const Robot& r) { return array3(r.angular_momentum()); },
+          nb::rv_policy::move)
       .def_prop_ro("info", [](const Robot& r) { return r.info(); })
       .def_prop_ro("contacts", [](const Robot& r) {
         return std::vector<Contact>(r.contacts().begin(), r.contacts().end());
@@ -196,7 +212,9 @@ void bind_world(nb::module_& m) {
            "method"_a, "law"_a, "single_contact"_a, "tolerance"_a, "relative_tolerance"_a,
            "max_sweeps"_a, "alpha"_a, "alpha_min"_a, "gamma"_a, "warm_start"_a)
       .def_prop_ro("time_step", [](const World& w) { return w.options().time_step; })
-      .def_prop_ro("gravity", [](const World& w) { return array3(w.options().gravity); })
+      .def_prop_ro(
+          "gravity", [](const World& w) { return array3(w.options().gravity); },
+          nb::rv_policy::move)
       .def_prop_ro("integrator",
                    [](const World& w) { return word_for(w.options().integrator, kIntegrators); })
       .def("add_ground", &World::add_ground, "height"_a, "material"_a)

@@ -21,6 +21,8 @@ using VectorIn =
     nanobind::ndarray<const double, nanobind::ndim<1>, nanobind::c_contig, nanobind::device::cpu>;
 /// Arrays that go out: NumPy, owned by Python, never a view of the simulation (which would change
 /// under the reader).
+/// Properties that return one say rv_policy::move: their default would tie the array to its object
+/// as well, which nanobind refuses for arrays that own their data.
 using ArrayOut = nanobind::ndarray<nanobind::numpy, double, nanobind::c_contig>;
 
 inline std::span<const double> span_of(const VectorIn& array) {
