@@ -1,0 +1,213 @@
+"""Contact problems from Python: shapes, errors, both laws, every method, agreement with the residual."""
+
+import hypothesis
+import numpy as np
+import pytest
+from hypothesis import strategies as st
+
+import stickslip as ss
+from stickslip.contact import _time_single_contact
+
+BLOCK = np.array([[2, 0.5, 0.3], [0.5, 1, -0.2], [0.3, -0.2, 1.5]])
+C = np.array([1.0, -2, -3])
+
+
+def random_problem(n: int, seed: int = 0) -> ss.ContactProblem:
+    """n feet: six shared dofs, three of their own each."""
+    rng = np.random.default_rng(seed)
+    Y = np.zeros((3 * n, 6 + 3 * n))
+    Y[:, :6] = rng.normal(size=(3 * n, 6)) * 0.3
+    for i in range(n):
+        Y[3 * i : 3 * i + 3, 6 + 3 * i : 9 + 3 * i] = rng.normal(size=(3, 3))
+    return ss.ContactProblem(Y @ Y.T, rng.normal(size=3 * n) - np.tile([0, 0, 1], n), rng.uniform(0.3, 1, n))
+
+
+def coulomb_residual(p: ss.ContactProblem, impulse: np.ndarray) -> np.ndarray:
+    """The De Saxce natural map, written again in NumPy."""
+    out = []
+    v = p.delassus @ impulse + p.free_velocity
+    for i, mu in enumerate(p.friction):
+        s = slice(3 * i, 3 * i + 3)
+        rho = 3 / np.trace(p.delassus[s, s])
+        u = v[s] + [0, 0, mu * np.hypot(*v[s][:2])]
+        z = impulse[s] - rho * u
+        t = np.hypot(z[0], z[1])
+        if t <= mu * z[2]:
+            projected = z
+        elif mu * t <= -z[2]:
+            projected = np.zeros(3)
+        else:
+            normal = (mu * t + z[2]) / (1 + mu**2)
+            projected = np.array([mu * normal * z[0] / t, mu * normal * z[1] / t, normal])
+        out.append(np.linalg.norm(impulse[s] - projected) / rho)
+    return np.array(out)
+
+
+@pytest.mark.parametrize("method", ["auto", "per_contact", "pgs"])
+def test_every_method_meets_the_residual(method):
+    for seed in range(20):
+        p = random_problem(4, seed)
+        s = ss.solve(p, method=method, max_sweeps=100000)
+        assert s.converged and s.status == "converged"
+        assert s.residual <= 1e-9
+        np.testing.assert_allclose(s.velocity, p.delassus @ s.impulse + p.free_velocity, atol=1e-12)
+        np.testing.assert_array_equal(s.contact_residuals, ss.residual(p, s.impulse))
+        assert s.residual == s.contact_residuals.max()
+
+
+def test_the_residual_is_the_natural_map():
+    for seed in range(50):
+        p = random_problem(3, seed)
+        impulse = np.random.default_rng(seed).normal(size=9)
+        np.testing.assert_allclose(ss.residual(p, impulse), coulomb_residual(p, impulse), rtol=1e-12, atol=1e-13)
+
+
+@pytest.mark.parametrize("law", ["coulomb", "max_dissipation"])
+@pytest.mark.parametrize("method", ["halley", "bisection", "quartic", "golden_section"])
+def test_solve_contact_agrees_with_solve(method, law):
+    if method == "golden_section" and law == "coulomb":
+        with pytest.raises(ValueError, match="golden_section minimizes the energy"):
+            ss.solve_contact(BLOCK, C, 0.5, method=method, law=law)
+        return
+    tolerance = 1e-6 if method == "golden_section" else 1e-10
+    x = ss.solve_contact(BLOCK, C, 0.5, method=method, law=law, tolerance=tolerance)
+    assert x.shape == (3,)
+    s = ss.solve(ss.ContactProblem(BLOCK, C, [0.5]), law=law)
+    np.testing.assert_allclose(x, s.impulse, atol=10 * tolerance + 1e-8)
+
+
+def test_coulomb_friction_opposes_sliding_and_maximum_dissipation_does_not_quite():
+    sine = {}
+    for law in ("coulomb", "max_dissipation"):
+        x = ss.solve_contact(BLOCK, C, 0.5, law=law)
+        v = BLOCK @ x + C
+        assert abs(v[2]) < 1e-9 and np.hypot(x[0], x[1]) == pytest.approx(0.5 * x[2])
+        sine[law] = abs(x[0] * v[1] - x[1] * v[0]) / np.hypot(x[0], x[1]) / np.hypot(v[0], v[1])
+    assert sine["coulomb"] < 1e-8
+    assert sine["max_dissipation"] > 0.01
+
+
+@hypothesis.given(
+    n=st.integers(1, 6),
+    rank=st.integers(1, 12),
+    mu=st.floats(0, 3),
+    seed=st.integers(0, 10**6),
+    law=st.sampled_from(["coulomb", "max_dissipation"]),
+)
+@hypothesis.settings(max_examples=150, deadline=None)
+def test_a_status_is_true_and_nothing_is_nan(n, rank, mu, seed, law):
+    rng = np.random.default_rng(seed)
+    Y = rng.normal(size=(3 * n, rank))
+    p = ss.ContactProblem(Y @ Y.T, Y @ rng.normal(size=rank), np.full(n, mu))
+    s = ss.solve(p, law=law, max_sweeps=200)
+    assert np.isfinite(s.impulse).all() and np.isfinite(s.velocity).all() and np.isfinite(s.residual)
+    assert s.converged == (ss.residual(p, s.impulse, law=law).max() <= 1e-9)
+    # Every impulse lies in its cone, converged or not.
+    x = s.impulse.reshape(-1, 3)
+    assert (np.hypot(x[:, 0], x[:, 1]) <= mu * x[:, 2] + 1e-9 * (1 + abs(x).max())).all()
+
+
+def test_a_warm_start_saves_sweeps():
+    p = random_problem(4, 1)
+    a = ss.solve(p, method="per_contact")
+    b = ss.solve(p, method="per_contact", impulse=a.impulse)
+    assert b.sweeps == 1 < a.sweeps
+
+
+def test_history_has_one_entry_per_sweep():
+    p = random_problem(4, 2)
+    s = ss.solve(p, method="per_contact", history=True)
+    assert len(s.history) == s.sweeps and s.history[-1] <= 1e-9
+    assert len(ss.solve(p).history) == 0
+    s = ss.solve(p, method="pgs", stop="update_sum", tolerance=1e-6, history=True)
+    assert s.history[-1] <= 1e-6
+
+
+def test_the_papers_settings_run():
+    p = random_problem(4, 3)
+    s = ss.solve(
+        p,
+        "per_contact",
+        law="max_dissipation",
+        tolerance=1e-6,
+        single_contact="bisection",
+        gamma=0.99,
+        stop="violation_sum",
+    )
+    assert s.residual < 1e-5 and s.sweeps < 50
+
+
+def test_bad_problems_raise_with_the_place():
+    G, mu = np.eye(3), [0.5]
+    for args, text in [
+        ((np.eye(4), C, mu), r"delassus has shape \(4, 4\); it must be \(3, 3\) for 1 contacts"),
+        ((G, C[:2], mu), r"free_velocity has shape \(2,\)"),
+        ((G, C, [[0.5]]), r"friction has shape \(1, 1\)"),
+        ((np.diag([1, np.nan, 1]), C, mu), r"delassus\[1, 1\] is nan"),
+        ((np.diag([1, -1.0, 1]), C, mu), r"delassus\[1, 1\] is -1"),
+        (([[1, 2, 0], [2, 1, 0], [0, 0, 1]], C, mu), "indefinite"),
+        (([[1, 0.1, 0], [0, 1, 0], [0, 0, 1]], C, mu), r"not symmetric: \[1, 0\] and \[0, 1\] differ by 0.1"),
+        ((G, [1, np.inf, 0], mu), r"free_velocity\[1\] is inf"),
+        ((G, C, [-0.5]), r"friction\[0\] is -0.5"),
+        ((G, C, [np.nan]), r"friction\[0\] is nan"),
+        ((G, "abc", mu), "free_velocity: not an array of numbers"),
+    ]:
+        with pytest.raises(ValueError, match=text):
+            ss.ContactProblem(*args)
+
+
+def test_bad_options_raise():
+    p = ss.ContactProblem(BLOCK, C, [0.5])
+    for options, text in [
+        ({"method": "newton"}, "method is 'newton'; choose one of 'auto', 'per_contact', 'pgs'"),
+        ({"law": "dry"}, "law is 'dry'"),
+        ({"tolerance": 0}, "tolerance is 0"),
+        ({"tolerance": np.nan}, "tolerance is nan"),
+        ({"max_sweeps": 0}, "max_sweeps is 0"),
+        ({"impulse": [1, 2]}, r"impulse has shape \(2,\)"),
+        ({"impulse": [1, 2, np.nan]}, r"impulse\[2\] is nan"),
+        ({"method": "pgs", "law": "max_dissipation"}, "pgs solves law coulomb only"),
+        ({"method": "per_contact", "single_contact": "golden_section"}, "golden_section"),
+        ({"alpha": -1}, "alpha is -1"),
+    ]:
+        with pytest.raises(ValueError, match=text):
+            ss.solve(p, **options)
+    with pytest.raises(TypeError, match="a ContactProblem is wanted"):
+        ss.solve(BLOCK)
+    with pytest.raises(ValueError, match=r"delassus has shape \(2, 2\)"):
+        ss.solve_contact(np.eye(2), C, 0.5)
+    with pytest.raises(ValueError, match=r"friction\[0\] is -1"):
+        ss.solve_contact(BLOCK, C, -1)
+
+
+def test_problems_are_read_only_copies():
+    G = BLOCK.copy()
+    p = ss.ContactProblem(G, C, [0.5])
+    G[0, 0] = 99
+    assert p.delassus[0, 0] == 2 and p.num_contacts == 1
+    with pytest.raises(ValueError):
+        p.delassus[0, 0] = 1
+
+
+def test_no_contacts_is_a_solved_problem():
+    s = ss.solve(ss.ContactProblem(np.zeros((0, 0)), [], []))
+    assert s.converged and s.impulse.shape == (0,)
+
+
+def test_a_contact_that_cannot_push_is_infeasible():
+    s = ss.solve(ss.ContactProblem(np.diag([1.0, 1, 0]), [0, 0, -1], [0.5]))
+    assert s.status == "infeasible" and not s.converged and s.residual > 0.1
+
+
+def test_methods_are_timed_on_given_contacts():
+    rng = np.random.default_rng(0)
+    A = rng.normal(size=(200, 3, 6))
+    G = A @ A.transpose(0, 2, 1)
+    c = rng.normal(size=(200, 3)) - [0, 0, 1]
+    times = _time_single_contact(
+        G, c, np.full(200, 0.5), ["halley", "bisection", "golden_section", "quartic"], rounds=3
+    )
+    assert set(times) == {"halley", "bisection", "golden_section", "quartic"}
+    for ns, evaluations, failures in times.values():
+        assert 0 < ns < 1e6 and evaluations >= 1 and 0 <= failures <= 1
+    assert times["halley"][2] == times["bisection"][2] == 0
