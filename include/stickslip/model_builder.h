@@ -39,9 +39,6 @@ class ModelBuilder {
   /// Says where the source speaks of an element, called as in "link 'torso'" or "joint 'knee'";
   /// errors then name the line.
   void set_line(const std::string& element, int line);
-  /// Checks names and references only: unique, known, one root, one parent each, no loops. Throws
-  /// ModelError.
-  void check_tree() const;
   /// Checks everything (names, one root, no loops, finite numbers, positive masses, positive
   /// definite inertias that keep the triangle inequality, unit axes, positive sizes), merges fixed
   /// joints, orders the tree. Throws ModelError.
@@ -59,6 +56,7 @@ class ModelBuilder {
   void check_link(const Link& link) const;
   void check_joint(const LinkJoint& joint) const;
   void check_shape(const std::string& link, const Shape& shape) const;
+  void place_shapes(Model& model, const Frame& frame) const;
   void merge_inertials(Model& model) const;
 
   std::string name_, source_;

@@ -16,6 +16,7 @@
 #include <limits>
 
 #include "bindings.h"
+#include "model/pose.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -84,10 +85,7 @@ Pose make_pose(const Vector3& position, const std::array<double, 4>& q) {
   if (!(length > 1e-6) || !std::isfinite(length))
     throw ModelError("orientation is not a quaternion w x y z: its length is " +
                      std::to_string(length));
-  const double w = q[0] / length, x = q[1] / length, y = q[2] / length, z = q[3] / length;
-  return {{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),  //
-           2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),  //
-           2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)},
+  return {rotation_of_quaternion(q[0] / length, q[1] / length, q[2] / length, q[3] / length),
           position};
 }
 

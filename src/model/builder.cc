@@ -98,13 +98,6 @@ void ModelBuilder::fail(const std::string& element, const std::string& what) con
   throw ModelError(source_ + place + ": " + element + ": " + what);
 }
 
-void ModelBuilder::check_tree() const {
-  std::vector<std::string> names;
-  for (const Link& link : links_) names.push_back(link.name);
-  make_tree(names, joints_,
-            [this](const std::string& element, const std::string& what) { fail(element, what); });
-}
-
 void ModelBuilder::check_link(const Link& link) const {
   if (!link.inertial) return;
   const std::string element = link_named(link.name);
@@ -164,6 +157,20 @@ void ModelBuilder::check_shape(const std::string& link, const Shape& shape) cons
                         " m; sizes must be finite and positive");
 }
 
+// Shapes move along with their link, in the order in which it got them.
+void ModelBuilder::place_shapes(Model& model, const Frame& frame) const {
+  int index = 0;
+  for (const auto& [link, given] : shapes_) {
+    if (link != frame.name) continue;
+    Shape shape = given;
+    if (shape.name.empty()) shape.name = link + "/" + std::to_string(index);
+    shape.body = frame.body;
+    shape.pose = compose(frame.pose, given.pose);
+    model.shapes_.push_back(shape);
+    ++index;
+  }
+}
+
 void ModelBuilder::merge_inertials(Model& model) const {
   std::vector<std::vector<Inertial>> parts(model.bodies_.size());
   std::vector<std::vector<const Link*>> links(model.bodies_.size());
@@ -188,15 +195,16 @@ void ModelBuilder::merge_inertials(Model& model) const {
                "that is fixed to it an <inertial> with a positive mass" +
                (b == 0 ? std::string(", or load the robot with a fixed base") : std::string()));
     const std::string defect = inertia_defect(body.inertial.inertia);
-    // The link to blame: the first whose own inertia is impossible, else the body's.
+    // The link to blame: the first whose own inertia is impossible, else the one that moves.
     std::string culprit = body.name;
     for (size_t k = links[b].size(); k-- > 0;) {
       const std::string own = inertia_defect(parts[b][k].inertia);
-      if (own.empty()) continue;
-      const double largest = principal_moments(parts[b][k].inertia)[2];
+      const Vector3 moments = principal_moments(parts[b][k].inertia);
+      if (own.empty() || (moments[0] == 0 && moments[2] == 0))
+        continue;  // a mere frame changes nothing
       if (!defect.empty())
         culprit = links[b][k]->name;
-      else if (largest > kInertiaThatMatters * principal_moments(body.inertial.inertia)[0])
+      else if (moments[2] > kInertiaThatMatters * principal_moments(body.inertial.inertia)[0])
         model.warnings_.push_back(link_named(links[b][k]->name) + ": its inertia " + own +
                                   "; kept, because body '" + body.name + "' as a whole is sound");
     }
@@ -248,17 +256,7 @@ ModelPtr ModelBuilder::build(BaseType base) const {
       fail(link_named(frame.name), "its position overflows");
     frame_of[l] = static_cast<int>(model->frames_.size());
     model->frames_.push_back(frame);
-    // Shapes move along, in the order in which the link got them.
-    int index = 0;
-    for (const auto& [link, given] : shapes_) {
-      if (link != frame.name) continue;
-      Shape shape = given;
-      if (shape.name.empty()) shape.name = link + "/" + std::to_string(index);
-      shape.body = frame.body;
-      shape.pose = compose(frame.pose, given.pose);
-      model->shapes_.push_back(shape);
-      ++index;
-    }
+    place_shapes(*model, frame);
   }
   merge_inertials(*model);
   return model;

@@ -179,6 +179,14 @@ TEST(BrokenLinkIsBlamedNotTheOneItIsFixedTo) {
                "r.urdf:4: link 'tool': the inertia of the body that joint 'j' moves");
 }
 
+TEST(MassAndInertiaOfMereFramesDoNotMatter) {
+  const std::string text = link_xml("base") + link_xml("imu", inertial("0", "0", "0", "0")) +
+                           joint_xml("f", "base", "imu", "fixed");
+  const ModelPtr model = parse_urdf(robot(text));
+  CHECK(model->warnings().empty());
+  CHECK(model->bodies()[0].inertial.inertia == (std::array<double, 6>{1, 0, 0, 1, 0, 1}));
+}
+
 TEST(BrokenPartOfASoundBodyIsAWarning) {
   const std::string text = link_xml("base") +
                            link_xml("camera", inertial("1", "0.1", "0.1", "0.5")) +
