@@ -86,7 +86,7 @@ STICKSLIP_INLINE void add_impulse(ExplicitProblem& p, int i, const double d[3]) 
   for (int j = 0; j < m; ++j) v[j] = madd(x[j], d0, madd(y[j], d1, madd(z[j], d2, v[j])));
 }
 
-/// Residual of contact i [m/s], (C3) for Coulomb's law, (C26) for maximum dissipation: |G_ii
+/// Residual of contact i [m/s], (C3) for Coulomb's law, (C25) for maximum dissipation: |G_ii
 /// (lambda_i - exact_i)| with the others held, and the speed of approach where the contact cannot
 /// push.
 inline double contact_residual(const ExplicitProblem& p, int i, bool max_dissipation) {
@@ -117,9 +117,9 @@ inline double largest_residual(const ExplicitProblem& p, bool max_dissipation) {
   return worst;
 }
 
-/// What contact i violates of its law [m/s], without solving anything: the least of what it would
-/// violate as an open, a sticking and a sliding contact (impulses times `scale`). Zero exactly at a
-/// solution, under either law.
+/// What contact i violates of its law [m/s], (C26), without solving anything: the least of what it
+/// would violate as an open, a sticking and a sliding contact (impulses times `scale`). Zero
+/// exactly at a solution, under either law.
 inline double contact_violation(const ExplicitProblem& p, int i, bool max_dissipation) {
   const LocalContact<double>& k = p.local[i];
   const double *v = p.v + 3 * i, *l = p.lambda + 3 * i;
