@@ -1,6 +1,7 @@
 // One scene: gravity, a ground plane, robots. Double precision, one thread.
 //
-// A robot only meets the ground in this version, so every robot is a contact problem of its own and is stepped on its own.
+// A robot only meets the ground in this version, so every robot is a contact problem of its own and
+// is stepped on its own.
 #pragma once
 #include <stickslip/contact.h>
 #include <stickslip/model.h>
@@ -15,15 +16,17 @@ namespace stickslip {
 
 /// How a step moves the state (docs/theory/step.md).
 enum class Integrator {
-  kEnergySafe,    ///< kick, projected drift, position correction at the new configuration, substeps; the default
-  kSemiImplicit,  ///< the paper's: semi-implicit Euler, a contact is active when its gap is negative, no correction
+  kEnergySafe,  ///< kick, projected drift, position correction at the new configuration, substeps;
+                ///< the default
+  kSemiImplicit,  ///< the paper's: semi-implicit Euler, a contact is active when its gap is
+                  ///< negative, no correction
 };
 
 /// Contact law of a pair of materials.
 struct MaterialPair {
-  double friction = 0.8;               ///< Coulomb's coefficient [1], >= 0
-  double restitution = 0;              ///< Newton's, 0..1 [1]
-  double restitution_threshold = 0;    ///< approach speed below which a contact does not bounce [m/s]
+  double friction = 0.8;             ///< Coulomb's coefficient [1], >= 0
+  double restitution = 0;            ///< Newton's, 0..1 [1]
+  double restitution_threshold = 0;  ///< approach speed below which a contact does not bounce [m/s]
 };
 
 /// How the contact impulses of a step are found.
@@ -31,10 +34,11 @@ struct StepSolverOptions {
   SolveMethod method = SolveMethod::kAuto;
   FrictionLaw law = FrictionLaw::kCoulomb;
   SingleContactMethod single_contact = SingleContactMethod::kHalley;  ///< kPerContact only
-  double tolerance = 1e-9;   ///< absolute part of the stopping test [m/s]
+  double tolerance = 1e-9;           ///< absolute part of the stopping test [m/s]
   double relative_tolerance = 1e-8;  ///< kAuto: part of the largest contact speed [1]
-  int max_sweeps = 100'000;  ///< kPerContact, kPgs
-  double alpha = 1.0, alpha_min = 0.7, gamma = 0.99;  ///< kPerContact, kPgs (alpha only); see SolveOptions
+  int max_sweeps = 100'000;          ///< kPerContact, kPgs
+  double alpha = 1.0, alpha_min = 0.7,
+         gamma = 0.99;  ///< kPerContact, kPgs (alpha only); see SolveOptions
   bool warm_start = true;
 };
 
@@ -43,46 +47,50 @@ struct WorldOptions {
   Vector3 gravity{0, 0, -9.81};  ///< [m/s^2]
   Integrator integrator = Integrator::kEnergySafe;
   StepSolverOptions solver;
-  int max_substeps = 8;          ///< kEnergySafe: a step is cut into at most this many parts when bodies turn fast
-  void validate() const;         ///< throws ModelError that names the option
+  int max_substeps =
+      8;  ///< kEnergySafe: a step is cut into at most this many parts when bodies turn fast
+  void validate() const;  ///< throws ModelError that names the option
 };
 
 struct RobotOptions {
-  std::string name;              ///< empty: the model's name, made unique
-  Vector3 position{0, 0, 0};     ///< of the base [m]; of a fixed base too
-  std::array<double, 4> orientation{1, 0, 0, 0};  ///< of the base, w x y z; normalized on the way in
+  std::string name;           ///< empty: the model's name, made unique
+  Vector3 position{0, 0, 0};  ///< of the base [m]; of a fixed base too
+  std::array<double, 4> orientation{1, 0, 0,
+                                    0};  ///< of the base, w x y z; normalized on the way in
   std::string material = "default";
 };
 
 /// Bits a step reports. Nothing is dropped silently.
 enum class StepStatus : std::uint32_t {
   kOk = 0,
-  kNotConverged = 1,  ///< cause: contact solve above its tolerance; the best impulse was used, see residual; remedy: smaller step
-  kNonFinite = 2,     ///< cause: forces or velocities overflowed; the robot was left in its last finite state; remedy: smaller step or forces
+  kNotConverged = 1,  ///< cause: contact solve above its tolerance; the best impulse was used, see
+                      ///< residual; remedy: smaller step
+  kNonFinite = 2,     ///< cause: forces or velocities overflowed; the robot was left in its last
+                      ///< finite state; remedy: smaller step or forces
 };
 
 /// One contact point of the last step.
 struct Contact {
-  int robot;          ///< index in the world
-  int body;           ///< of the robot's model
-  int shape;          ///< of the robot's model
-  int point;          ///< of the shape (a box has 8 corners)
-  Vector3 position;   ///< world [m], at the start of the step
-  Vector3 normal;     ///< world, from the ground to the robot
-  double gap;         ///< at the start of the step [m], negative where they overlap
-  double friction;    ///< [1]
-  Vector3 impulse;    ///< on the robot, world axes [N s], of the last substep
-  Vector3 velocity;   ///< after the impulse, world axes [m/s]
+  int robot;         ///< index in the world
+  int body;          ///< of the robot's model
+  int shape;         ///< of the robot's model
+  int point;         ///< of the shape (a box has 8 corners)
+  Vector3 position;  ///< world [m], at the start of the step
+  Vector3 normal;    ///< world, from the ground to the robot
+  double gap;        ///< at the start of the step [m], negative where they overlap
+  double friction;   ///< [1]
+  Vector3 impulse;   ///< on the robot, world axes [N s], of the last substep
+  Vector3 velocity;  ///< after the impulse, world axes [m/s]
 };
 
 /// What the last step did for one robot (its last substep, where there were several).
 struct StepInfo {
   StepStatus status = StepStatus::kOk;
-  int contacts = 0;       ///< candidates in the solve
+  int contacts = 0;  ///< candidates in the solve
   int sweeps = 0;
   int newton_steps = 0;
   int substeps = 1;
-  double residual = 0;    ///< largest contact residual [m/s]
+  double residual = 0;  ///< largest contact residual [m/s]
 };
 
 /// Seconds spent per stage since the last reset; only counted while `World::set_profiling(true)`.
@@ -108,15 +116,16 @@ class Robot {
 
   std::span<const double> q() const;  ///< (nq), see Model
   std::span<const double> u() const;  ///< (nu), see Model
-  /// Sets position and velocity and forgets warm start and integrator history. Throws ModelError for wrong lengths, NaN or a
-  /// quaternion that is not near unit length (it is normalized).
+  /// Sets position and velocity and forgets warm start and integrator history. Throws ModelError
+  /// for wrong lengths, NaN or a quaternion that is not near unit length (it is normalized).
   void set_state(std::span<const double> q, std::span<const double> u);
 
-  /// Generalized force [N, N m] (nu), kept until changed. Throws ModelError for a wrong length or NaN.
+  /// Generalized force [N, N m] (nu), kept until changed. Throws ModelError for a wrong length or
+  /// NaN.
   void set_generalized_force(std::span<const double> tau);
   std::span<const double> generalized_force() const;
-  /// Joint PD control tau = kp (target - q) - kd u, taken implicitly in the rates so that no gain is too stiff for the step.
-  /// kp [N m/rad or N/m], kd [N m s/rad or N s/m] (joints), >= 0.
+  /// Joint PD control tau = kp (target - q) - kd u, taken implicitly in the rates so that no gain
+  /// is too stiff for the step. kp [N m/rad or N/m], kd [N m s/rad or N s/m] (joints), >= 0.
   void set_pd_gains(std::span<const double> kp, std::span<const double> kd);
   std::span<const double> pd_kp() const;
   std::span<const double> pd_kd() const;
@@ -124,20 +133,28 @@ class Robot {
   std::span<const double> pd_target() const;
 
   void mass_matrix(std::span<double> out) const;  ///< row-major (nu, nu) [kg, kg m, kg m^2]
-  /// h in M du/dt + h = tau: gravity, Coriolis and centrifugal forces (nu) [N, N m]. Without damping and control.
+  /// h in M du/dt + h = tau: gravity, Coriolis and centrifugal forces (nu) [N, N m]. Without
+  /// damping and control.
   void bias_force(std::span<double> out) const;
   /// Accelerations du/dt without contacts for generalized forces tau (nu) -> (nu).
   void forward_dynamics(std::span<const double> tau, std::span<double> out) const;
-  /// Rows 0-2: velocity of the frame's origin, rows 3-5: angular velocity, world axes; row-major (6, nu).
+  /// Rows 0-2: velocity of the frame's origin, rows 3-5: angular velocity, world axes; row-major
+  /// (6, nu).
   void jacobian(const std::string& frame, std::span<double> out) const;
   Pose frame_pose(const std::string& frame) const;  ///< in the world
-  double kinetic_energy() const;    ///< [J]
-  double potential_energy() const;  ///< [J], zero at the world's origin
-  Vector3 center_of_mass() const;   ///< [m]
-  Vector3 linear_momentum() const;  ///< [kg m/s]
-  Vector3 angular_momentum() const; ///< about the centre of mass [kg m^2/s]
-  /// G = J M^-1 J^T (3n, 3n) row-major [1/kg] of n points fixed to bodies; points in world axes [m].
-  void delassus(std::span<const int> bodies, std::span<const Vector3> points, std::span<double> out) const;
+  double kinetic_energy() const;                    ///< [J]
+  double potential_energy() const;                  ///< [J], zero at the world's origin
+  /// Kinetic plus potential energy at the time of q, as the integrator accounts for it [J]. While
+  /// in contact, u of the energy-safe integrator lacks half a step of gravity; this adds it.
+  /// Contacts never make it grow.
+  double mechanical_energy() const;
+  Vector3 center_of_mass() const;    ///< [m]
+  Vector3 linear_momentum() const;   ///< [kg m/s]
+  Vector3 angular_momentum() const;  ///< about the centre of mass [kg m^2/s]
+  /// G = J M^-1 J^T (3n, 3n) row-major [1/kg] of n points fixed to bodies; points in world axes
+  /// [m].
+  void delassus(std::span<const int> bodies, std::span<const Vector3> points,
+                std::span<double> out) const;
 
   const StepInfo& info() const;
   std::span<const Contact> contacts() const;  ///< of the last step
@@ -158,7 +175,8 @@ class World {
 
   /// A horizontal plane that fills everything below z = height [m]. One per world.
   void add_ground(double height = 0, const std::string& material = "default");
-  /// Adds a robot at its zero configuration (base as the options say). A failed call leaves the world as it was.
+  /// Adds a robot at its zero configuration (base as the options say). A failed call leaves the
+  /// world as it was.
   Robot& add_robot(ModelPtr model, const RobotOptions& options = {});
   void set_material_pair(const std::string& a, const std::string& b, const MaterialPair& pair);
 
@@ -171,8 +189,8 @@ class World {
   /// Advances every robot by `steps` time steps; returns the status bits of all of them, or-ed.
   StepStatus step(int steps = 1);
 
-  /// Everything that changes in a step, as bytes; `load_state` replays bit for bit. Throws ModelError if the blob is not of a
-  /// world with the same robots.
+  /// Everything that changes in a step, as bytes; `load_state` replays bit for bit. Throws
+  /// ModelError if the blob is not of a world with the same robots.
   std::vector<std::uint8_t> save_state() const;
   void load_state(std::span<const std::uint8_t> blob);
 

@@ -33,4 +33,23 @@ void compute_bias(Tree<S>& t, const Vec3<S>& angular_velocity, const S* rates,
   }
 }
 
+/// Generalized forces of the link forces, summed toward the base: joints into `out` (num_joints),
+/// the whole into base.force.
+template <class S>
+void collect_joint_forces(Tree<S>& t, S* out) {
+  using W = Wide<S>;
+  for (int slot = 0; slot < t.num_slots; ++slot)
+    if (t.slots[slot].has_children) t.links[slot].force_from_children = {};
+  for (int ib = t.num_bundles - 1; ib >= 0; --ib) {
+    const Bundle& b = t.bundles[ib];
+    Spatial<W> f = zero_spatial<W>();
+    for (int slot = b.first_slot + b.length - 1; slot >= b.first_slot; --slot) {
+      f = f + t.links[slot].force;
+      if (t.slots[slot].has_children) f = f + t.links[slot].force_from_children;
+      store_lanes<S>(dot(f, t.links[slot].axis), out, t.slots[slot].joint, b.lanes);
+    }
+    add_to_parents<S, Spatial>(t, b, f, t.base.force, &LinkState<W>::force_from_children);
+  }
+}
+
 }  // namespace stickslip::dynamics

@@ -37,20 +37,23 @@ STICKSLIP_INLINE void solve_base(const BaseState<S>& base, S x[6]) {
   }
 }
 
+/// Which forces besides the joint forces act in `solve_lower_transposed`.
+enum class LinkForces { kNone, kBaseOnly, kAll };
+
 /// x = L^-T (tau + forces on links), into links[].x and base.x. `tau` (num_joints) may be null;
-/// `link_forces` says whether links[].force and base.force take part.
+/// `forces` says whether base.force and links[].force take part.
 template <class S>
-void solve_lower_transposed(Tree<S>& t, const S* tau, bool link_forces) {
+void solve_lower_transposed(Tree<S>& t, const S* tau, LinkForces forces) {
   using W = Wide<S>;
   for (int slot = 0; slot < t.num_slots; ++slot)
     if (t.slots[slot].has_children) t.links[slot].force_from_children = {};
-  Spatial<S> on_base = link_forces ? t.base.force : zero_spatial<S>();
+  Spatial<S> on_base = forces != LinkForces::kNone ? t.base.force : zero_spatial<S>();
   for (int ib = t.num_bundles - 1; ib >= 0; --ib) {
     const Bundle& b = t.bundles[ib];
     Spatial<W> f = zero_spatial<W>();
     for (int slot = b.first_slot + b.length - 1; slot >= b.first_slot; --slot) {
       LinkState<W>& link = t.links[slot];
-      if (link_forces) f = f + link.force;
+      if (forces == LinkForces::kAll) f = f + link.force;
       if (t.slots[slot].has_children) f = f + link.force_from_children;
       W on_joint = dot(f, link.axis);
       if (tau) on_joint = on_joint + load_lanes(tau, t.slots[slot].joint);

@@ -40,7 +40,7 @@ std::vector<S> run_kernels(const Model& model, const std::vector<std::vector<dou
   compute_inertias(t);
   factor_mass_matrix(t, extra.data());
   compute_bias(t, w, rates.data(), gravity);
-  solve_lower_transposed(t, rates.data(), true);
+  solve_lower_transposed(t, rates.data(), LinkForces::kAll);
   S base[6];
   solve_lower(t, base, joints.data());
   out.insert(out.end(), base, base + 6);
@@ -180,7 +180,7 @@ TEST(SolvesInvertTheMassMatrix) {
     std::vector<RigidInertia<Wide<double>>> scratch(t.num_slots);
     std::vector<double> m(nu * nu), a(nu);
     compute_mass_matrix(t, scratch.data(), m.data());
-    solve_lower_transposed(t, s.data() + 7, false);
+    solve_lower_transposed(t, s.data() + 7, LinkForces::kNone);
     double base[6];
     solve_lower(t, base, a.data() + offset);
     for (int k = 0; k < offset; ++k) a[k] = base[k];

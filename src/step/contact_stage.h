@@ -1,0 +1,112 @@
+// From shapes to impulses: which support points take part, their rows, the factored problem, its
+// solve.
+#pragma once
+#include <stickslip/world.h>
+
+#include <memory>
+#include <vector>
+
+#include "collide/ground_shapes.h"
+#include "contact/explicit_problem.h"
+#include "contact/factored.h"
+#include "dynamics/contact_rows.h"
+#include "dynamics/tree_memory.h"
+
+namespace stickslip::step {
+
+/// A support point that takes part in the solve.
+struct ActiveContact {
+  int shape;              // index in ContactStage::shapes()
+  int point;              // of the shape
+  int id;                 // among all support points of the robot
+  Vec3<double> position;  // relative to the base origin, world axes
+  double gap;             // [m]
+  Vec3<double> velocity;  // of the point before the impulse [m/s]
+  double shift;  // added to the normal velocity: allowed approach gap / h, less restitution [m/s]
+  dynamics::ContactRows<double> rows;
+};
+
+class ContactStage {
+ public:
+  ContactStage(const Model& model, const dynamics::TreeLayout& layout, int max_depth);
+
+  const std::vector<collide::GroundShape>& shapes() const { return shapes_; }
+  int num_points() const { return num_points_; }
+  /// Contact law per shape of `shapes()`.
+  std::vector<MaterialPair>& laws() { return laws_; }
+  const MaterialPair& law(int shape) const { return laws_[shape]; }
+
+  /// Takes the points whose gap is negative ([Hwangbo 2018]). `clearance`: height of the base
+  /// origin above the ground.
+  void detect_overlapping(const dynamics::Tree<double>& tree, double clearance);
+  /// Takes the points that may touch within h: gap < 2 mm + h (approach speed + largest speed of
+  /// any shape). Link velocities are those of the free motion.
+  void detect_reachable(const dynamics::Tree<double>& tree, double clearance,
+                        const Vec3<double>& base_velocity, double h);
+  int count() const { return count_; }
+  ActiveContact& active(int i) { return active_[i]; }
+  const ActiveContact& active(int i) const { return active_[i]; }
+  void forget() { count_ = 0; }
+
+  /// Velocities of the active points from the link velocities.
+  void compute_velocities(const dynamics::Tree<double>& tree, const Vec3<double>& base_velocity);
+  /// Speculative contacts: a point at `gap` above the ground may approach with gap / h.
+  void allow_closing(double h);
+  /// Newton's restitution where the gap closes within h. Approach speeds are taken before the kick
+  /// of this step: `kick` is what it added to normal velocities [m/s].
+  void add_restitution(double kick, double h);
+  /// Rows and the factored problem. `with_x`: free velocities come from J u + Y x with the tree's
+  /// x; otherwise from J u.
+  void build_problem(dynamics::Tree<double>& tree, bool with_x);
+  /// Solves; `warm` (3 per support point) is in and out, in force units: impulse = force * h.
+  void solve(const StepSolverOptions& options, double* warm, double h, StepInfo& info);
+  /// Adds Y^T lambda to the tree's x.
+  void add_impulses(dynamics::Tree<double>& tree) const;
+  bool any_impulse() const;
+  Vec3<double> total_impulse() const;  // [N s]
+  /// Energy the impulses gave, sum lambda . (c + G lambda / 2), with c the free velocity before the
+  /// shift [J].
+  double work() const;
+
+  const double* impulse(int i) const { return problem_.contact(i).impulse; }
+  Vec3<double> velocity_after(int i) const {
+    const double* v = problem_.velocity(i);
+    return {v[0], v[1], v[2] - active_[i].shift};
+  }
+  /// Memory for the methods that need the dense problem; call once before the first such solve.
+  void reserve_explicit();
+  /// The problem written out, dense.
+  ContactProblem explicit_problem() const;
+
+  /// Moves overlapping points of the solve to the surface: delta = L^-1 Z^T x with 0 <= x, gap + Z
+  /// Z^T x >= 0, normal rows Z at the tree's present positions and the factor as it is. Leaves
+  /// delta in L-space (the tree's x); false if nothing to do.
+  bool correct_overlap(dynamics::Tree<double>& tree, double clearance, double tolerance);
+
+ private:
+  void add(int shape, int point, const Vec3<double>& position, double gap);
+  /// Takes the points lower than `reach` above the ground.
+  void detect_within(const dynamics::Tree<double>& tree, double clearance, double reach);
+  void write_out(double* g, double* c, double* mu, double* lambda) const;
+  void solve_explicit(const StepSolverOptions& options, StepInfo& info);
+
+  std::vector<collide::GroundShape> shapes_;
+  std::vector<collide::PlacedShape> placed_;
+  std::vector<MaterialPair> laws_;
+  int num_points_, max_depth_, num_dofs_;
+  bool floating_;
+  std::vector<ActiveContact> active_;
+  int count_ = 0;
+  std::vector<dynamics::LinkIndex> paths_;
+  std::vector<Row3<double>> rows_;
+  std::vector<int> uses_, shared_dof_;       // per slot and lane
+  std::vector<dynamics::LinkIndex> shared_;  // joints that several contacts share
+  int num_shared_ = 0;
+  std::vector<int> index_;
+  std::unique_ptr<char, void (*)(char*)> memory_;
+  contact::FactoredProblem<double> problem_;
+  std::vector<Vec3<double>> moved_;  // active points at the new configuration
+  std::vector<double> dense_, gaps_, displacement_, normal_, pushes_;
+};
+
+}  // namespace stickslip::step

@@ -1,0 +1,27 @@
+// What is behind a Robot: its data, and a second workspace for questions, so that asking does not
+// disturb the step.
+#pragma once
+#include "step/robot_data.h"
+
+namespace stickslip {
+
+struct Robot::Impl {
+  Impl(ModelPtr model, const RobotOptions& options);
+
+  /// Positions and inertias (and link velocities) at the present state.
+  dynamics::Tree<double>& tree_at_state(bool velocities);
+  /// L u at the present state, with this velocity of the base origin, into the query tree.
+  void multiply_by_factor(const Vec3<double>& base_velocity);
+  /// Of the whole robot: lin [kg m/s], ang about the base origin [kg m^2/s].
+  Spatial<double> momentum();
+  void collect_contacts();
+
+  step::RobotData data;
+  dynamics::TreeMemory<double> query;
+  std::vector<RigidInertia<dynamics::Wide<double>>> scratch;
+  std::vector<Contact> contacts;
+  Vec3<double> gravity;
+  int index = 0;  // in the world
+};
+
+}  // namespace stickslip

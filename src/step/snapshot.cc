@@ -1,0 +1,106 @@
+#include "step/snapshot.h"
+
+#include <stickslip/errors.h>
+
+#include <cmath>
+#include <cstring>
+
+namespace stickslip::step {
+namespace {
+
+constexpr std::uint64_t kMagic = 0x31304c5053535453;  // "STSSPL01"
+
+class Writer {
+ public:
+  void number(double x) { bytes(&x, sizeof x); }
+  void count(std::uint64_t n) { bytes(&n, sizeof n); }
+  void numbers(const std::vector<double>& v) {
+    count(v.size());
+    bytes(v.data(), v.size() * sizeof(double));
+  }
+  std::vector<std::uint8_t> take() { return std::move(out_); }
+
+ private:
+  void bytes(const void* p, size_t n) {
+    const auto* b = static_cast<const std::uint8_t*>(p);
+    out_.insert(out_.end(), b, b + n);
+  }
+  std::vector<std::uint8_t> out_;
+};
+
+class Reader {
+ public:
+  explicit Reader(std::span<const std::uint8_t> in) : in_(in) {}
+  double number() {
+    double x;
+    bytes(&x, sizeof x);
+    if (!std::isfinite(x))
+      throw ModelError("load_state: the state holds a number that is not finite");
+    return x;
+  }
+  std::uint64_t count() {
+    std::uint64_t n;
+    bytes(&n, sizeof n);
+    return n;
+  }
+  void numbers(std::vector<double>& out, size_t expected) {
+    const std::uint64_t n = count();
+    if (n != expected)
+      throw ModelError("load_state: the state is of another world (expected " +
+                       std::to_string(expected) + " numbers, found " + std::to_string(n) + ")");
+    out.resize(n);
+    for (double& x : out) x = number();
+  }
+  bool done() const { return in_.empty(); }
+
+ private:
+  void bytes(void* p, size_t n) {
+    if (in_.size() < n) throw ModelError("load_state: the state is cut short");
+    std::memcpy(p, in_.data(), n);
+    in_ = in_.subspan(n);
+  }
+  std::span<const std::uint8_t> in_;
+};
+
+}  // namespace
+
+std::vector<std::uint8_t> write_snapshot(double time,
+                                         const std::vector<const RobotState*>& robots) {
+  Writer w;
+  w.count(kMagic);
+  w.number(time);
+  w.count(robots.size());
+  for (const RobotState* s : robots) {
+    for (const auto* v : {&s->q, &s->u, &s->impulse, &s->drift_acceleration}) w.numbers(*v);
+    w.number(s->time);
+    w.number(s->pending_gravity);
+    w.count(s->fresh);
+  }
+  return w.take();
+}
+
+Snapshot read_snapshot(std::span<const std::uint8_t> blob,
+                       const std::vector<const RobotState*>& shapes) {
+  Reader r(blob);
+  if (r.count() != kMagic) throw ModelError("load_state: these bytes are not a saved state");
+  Snapshot out;
+  out.time = r.number();
+  if (const std::uint64_t n = r.count(); n != shapes.size())
+    throw ModelError("load_state: the state is of a world with " + std::to_string(n) +
+                     " robots, this one has " + std::to_string(shapes.size()));
+  for (const RobotState* shape : shapes) {
+    RobotState s;
+    r.numbers(s.q, shape->q.size());
+    r.numbers(s.u, shape->u.size());
+    r.numbers(s.impulse, shape->impulse.size());
+    r.numbers(s.drift_acceleration, shape->drift_acceleration.size());
+    s.time = r.number();
+    s.pending_gravity = r.number();
+    s.fresh = r.count() != 0;
+    out.robots.push_back(std::move(s));
+  }
+  if (!r.done()) throw ModelError("load_state: bytes are left over after the state");
+  return out;
+}
+
+}  // namespace stickslip::step

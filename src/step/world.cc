@@ -1,0 +1,206 @@
+// The public World: robots, ground, materials; a step is every robot's step.
+#include <stickslip/errors.h>
+
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "step/robot_impl.h"
+#include "step/snapshot.h"
+
+namespace stickslip {
+namespace {
+
+[[noreturn]] void reject(const std::string& what) { throw ModelError(what); }
+
+std::pair<std::string, std::string> ordered(const std::string& a, const std::string& b) {
+  return a < b ? std::pair{a, b} : std::pair{b, a};
+}
+
+}  // namespace
+
+void WorldOptions::validate() const {
+  if (!(time_step > 0) || !std::isfinite(time_step))
+    reject("time_step must be positive and finite, got " + std::to_string(time_step));
+  for (double g : gravity)
+    if (!std::isfinite(g)) reject("gravity must be finite");
+  if (max_substeps < 1)
+    reject("max_substeps must be at least 1, got " + std::to_string(max_substeps));
+  const StepSolverOptions& s = solver;
+  if (!(s.tolerance > 0) || !std::isfinite(s.tolerance))
+    reject("solver tolerance must be positive");
+  if (!(s.relative_tolerance >= 0)) reject("solver relative_tolerance must be >= 0");
+  if (s.max_sweeps < 1) reject("solver max_sweeps must be at least 1");
+  if (!(s.alpha > 0 && s.alpha <= 1)) reject("solver alpha must be in (0, 1]");
+  if (!(s.alpha_min > 0 && s.alpha_min <= 1)) reject("solver alpha_min must be in (0, 1]");
+  if (!(s.gamma > 0 && s.gamma <= 1)) reject("solver gamma must be in (0, 1]");
+  if (s.method == SolveMethod::kPgs && s.law == FrictionLaw::kMaxDissipation)
+    reject("solver method pgs solves Coulomb's law only; choose law coulomb or another method");
+  if (s.method == SolveMethod::kPerContact && s.law == FrictionLaw::kCoulomb &&
+      s.single_contact == SingleContactMethod::kGoldenSection)
+    reject("golden_section minimizes energy and needs law max_dissipation");
+}
+
+struct World::Impl {
+  explicit Impl(const WorldOptions& o) : options(o) {
+    context.time_step = o.time_step;
+    context.gravity = {o.gravity[0], o.gravity[1], o.gravity[2]};
+    context.ground = false;
+    context.ground_height = 0;
+    context.max_substeps = o.max_substeps;
+    context.times = nullptr;
+  }
+
+  MaterialPair pair(const std::string& a, const std::string& b) const {
+    const auto found = pairs.find(ordered(a, b));
+    return found == pairs.end() ? MaterialPair{} : found->second;
+  }
+  void refresh_laws() {
+    for (auto& robot : robots) {
+      step::RobotData& d = robot->impl_->data;
+      for (size_t k = 0; k < d.contacts.shapes().size(); ++k) {
+        const std::string& own = d.model->shapes()[d.contacts.shapes()[k].shape].material;
+        d.contacts.laws()[k] = pair(own.empty() ? d.material : own, ground_material);
+      }
+    }
+  }
+  void step_one(step::RobotData& d) {
+    if (options.integrator == Integrator::kSemiImplicit)
+      step_semi_implicit(d, context);
+    else
+      step_energy_safe(d, context);
+  }
+
+  WorldOptions options;
+  step::StepContext context;
+  std::string ground_material = "default";
+  std::map<std::pair<std::string, std::string>, MaterialPair> pairs;
+  std::vector<std::unique_ptr<Robot>> robots;
+  StageTimes times;
+  double time = 0;
+};
+
+World::World(const WorldOptions& options) {
+  options.validate();
+  impl_ = std::make_unique<Impl>(options);
+  impl_->context.solver = &impl_->options.solver;
+}
+World::~World() = default;
+World::World(World&&) noexcept = default;
+World& World::operator=(World&&) noexcept = default;
+
+void World::add_ground(double height, const std::string& material) {
+  if (impl_->context.ground) reject("add_ground: the world has a ground already");
+  if (!std::isfinite(height)) reject("add_ground: height is not finite");
+  impl_->context.ground = true;
+  impl_->context.ground_height = height;
+  impl_->ground_material = material;
+  impl_->refresh_laws();
+}
+
+Robot& World::add_robot(ModelPtr model, const RobotOptions& given) {
+  if (!model) reject("add_robot: the model is null");
+  RobotOptions o = given;
+  double norm = 0;
+  for (double x : o.orientation) norm += x * x;
+  norm = std::sqrt(norm);
+  if (!(norm > 1e-6) || !std::isfinite(norm))
+    reject("add_robot: orientation must be a quaternion (w, x, y, z) that is not zero");
+  for (double& x : o.orientation) x /= norm;
+  for (double x : o.position)
+    if (!std::isfinite(x)) reject("add_robot: position is not finite");
+  std::set<std::string> names;
+  for (const auto& r : impl_->robots) names.insert(r->name());
+  if (!o.name.empty() && names.count(o.name))
+    reject("add_robot: the world has a robot named '" + o.name + "' already");
+  if (o.name.empty()) {
+    o.name = model->name();
+    for (int k = 2; names.count(o.name); ++k) o.name = model->name() + "_" + std::to_string(k);
+  }
+  auto robot_impl = std::make_unique<Robot::Impl>(model, o);
+  robot_impl->gravity = impl_->context.gravity;
+  robot_impl->index = num_robots();
+  robot_impl->contacts.reserve(robot_impl->data.contacts.num_points());
+  if (impl_->options.solver.method != SolveMethod::kAuto)
+    robot_impl->data.contacts.reserve_explicit();
+  robot_impl->data.state.time = impl_->time;
+  impl_->robots.push_back(std::unique_ptr<Robot>(new Robot(std::move(robot_impl))));
+  impl_->refresh_laws();
+  return *impl_->robots.back();
+}
+
+void World::set_material_pair(const std::string& a, const std::string& b, const MaterialPair& p) {
+  const std::string where = "set_material_pair('" + a + "', '" + b + "'): ";
+  if (!(p.friction >= 0) || std::isnan(p.friction)) reject(where + "friction must be >= 0");
+  if (!(p.restitution >= 0 && p.restitution <= 1)) reject(where + "restitution must be in [0, 1]");
+  if (!(p.restitution_threshold >= 0)) reject(where + "restitution_threshold must be >= 0");
+  impl_->pairs[ordered(a, b)] = p;
+  impl_->refresh_laws();
+}
+
+int World::num_robots() const { return static_cast<int>(impl_->robots.size()); }
+
+Robot& World::robot(int index) {
+  if (index < 0 || index >= num_robots())
+    reject("robot " + std::to_string(index) + " does not exist; the world has " +
+           std::to_string(num_robots()));
+  return *impl_->robots[index];
+}
+const Robot& World::robot(int index) const { return const_cast<World*>(this)->robot(index); }
+
+double World::time() const { return impl_->time; }
+const WorldOptions& World::options() const { return impl_->options; }
+
+StepStatus World::step(int steps) {
+  if (steps < 0) reject("step: the number of steps must be >= 0, got " + std::to_string(steps));
+  std::uint32_t status = 0;
+  for (int k = 0; k < steps; ++k) {
+    for (auto& robot : impl_->robots) {
+      step::RobotData& d = robot->impl_->data;
+      impl_->step_one(d);
+      status |= static_cast<std::uint32_t>(d.info.status);
+    }
+    impl_->time += impl_->options.time_step;
+    if (impl_->context.times) ++impl_->times.steps;
+  }
+  return static_cast<StepStatus>(status);
+}
+
+std::vector<std::uint8_t> World::save_state() const {
+  std::vector<const step::RobotState*> states;
+  for (const auto& r : impl_->robots) states.push_back(&r->impl_->data.state);
+  return step::write_snapshot(impl_->time, states);
+}
+
+void World::load_state(std::span<const std::uint8_t> blob) {
+  std::vector<const step::RobotState*> shapes;
+  for (const auto& r : impl_->robots) shapes.push_back(&r->impl_->data.state);
+  step::Snapshot snapshot = step::read_snapshot(blob, shapes);  // throws before anything changes
+  impl_->time = snapshot.time;
+  for (size_t k = 0; k < snapshot.robots.size(); ++k) {
+    step::RobotData& d = impl_->robots[k]->impl_->data;
+    d.state = snapshot.robots[k];
+    d.prepared_step = 0;
+    d.contacts.forget();
+  }
+}
+
+ContactProblem World::next_contact_problem(int index) {
+  Robot& r = robot(index);
+  step::RobotData& d = r.impl_->data;
+  const step::RobotState before = d.state;
+  const StepInfo info = d.info;
+  impl_->step_one(d);
+  ContactProblem p = d.contacts.explicit_problem();
+  d.state = before;
+  d.info = info;
+  d.prepared_step = 0;
+  d.contacts.forget();
+  return p;
+}
+
+void World::set_profiling(bool on) { impl_->context.times = on ? &impl_->times : nullptr; }
+const StageTimes& World::stage_times() const { return impl_->times; }
+void World::reset_stage_times() { impl_->times = StageTimes{}; }
+
+}  // namespace stickslip
