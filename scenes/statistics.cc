@@ -1,26 +1,25 @@
 #include "scenes/statistics.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "scenes/vector.h"
 
 namespace stickslip::scenes {
 
-double node_energy(const Robot& robot, const WorldOptions& options) {
-  if (options.integrator == Integrator::kEnergySafe)
-    return robot.kinetic_energy() + robot.potential_energy();
-  constexpr int kSize = 6 + kNumJoints;
-  std::array<double, kSize * kSize> m;
-  std::array<double, kSize> u;
-  std::copy(robot.u().begin(), robot.u().end(), u.begin());
-  for (int i = 0; i < 3; ++i) u[i] -= options.gravity[i] * options.time_step / 2;
-  robot.mass_matrix(m);
-  double twice = 0;
-  for (int i = 0; i < kSize; ++i)
-    for (int j = 0; j < kSize; ++j) twice += u[i] * m[kSize * i + j] * u[j];
-  return twice / 2 + robot.potential_energy();
+std::optional<double> node_energy(const Robot& robot, const WorldOptions& options) {
+  const double dt = options.time_step;
+  double kick = -dt / 2;  // semi-implicit
+  if (options.integrator == Integrator::kEnergySafe) {
+    bool pushed = false;
+    for (const Contact& c : robot.contacts()) pushed = pushed || dot(c.impulse, c.impulse) > 0;
+    if (pushed && robot.info().substeps > 1) return std::nullopt;
+    kick = pushed ? dt / 2 : 0;
+  }
+  // T(u + g kick) = T(u) + p . g kick + m |g kick|^2 / 2
+  const Vector3 change = kick * options.gravity;
+  return robot.kinetic_energy() + dot(robot.linear_momentum(), change) +
+         robot.model().mass() * dot(change, change) / 2 + robot.potential_energy();
 }
 
 Statistics::Statistics(const WorldOptions& options, double settle, bool track_energy)
@@ -35,7 +34,7 @@ void Statistics::begin(const Robot& robot) {
   time_ = 0;
   x_ = robot.q()[0];
   exploded_ = false;
-  // at rest at the start, the node velocity is the given one, whatever the integrator
+  // a state that was just set is the node's, whatever the integrator
   lowest_energy_ = robot.kinetic_energy() + robot.potential_energy();
 }
 
@@ -65,9 +64,10 @@ void Statistics::observe(const Robot& robot) {
   }
 
   if (track_energy_) {
-    const double energy = node_energy(robot, options_);
-    max_energy_growth = std::max(max_energy_growth, energy - lowest_energy_);
-    lowest_energy_ = std::min(lowest_energy_, energy);
+    if (const std::optional<double> energy = node_energy(robot, options_)) {
+      max_energy_growth = std::max(max_energy_growth, *energy - lowest_energy_);
+      lowest_energy_ = std::min(lowest_energy_, *energy);
+    }
   }
 
   distance += q[0] - x_;

@@ -2,6 +2,8 @@
 #pragma once
 #include <stickslip/world.h>
 
+#include <optional>
+
 #include "scenes/anymal.h"
 
 namespace stickslip::scenes {
@@ -11,7 +13,7 @@ namespace stickslip::scenes {
 class Statistics {
  public:
   /// `settle`: penetration counts only after so much of an episode [s]; `track_energy`: see
-  /// `max_energy_growth`, costs a mass matrix per step.
+  /// `max_energy_growth`, costs a factorization per step.
   Statistics(const WorldOptions& options, double settle = 2.0, bool track_energy = false);
 
   void begin(const Robot& robot);
@@ -41,8 +43,11 @@ class Statistics {
   long penetration_count_ = 0;
 };
 
-/// Kinetic plus potential energy at the state (q, u) of the last step [J], by the rule under which
-/// a free parabola keeps it exactly: the semi-implicit velocity is half a gravity kick ahead.
-double node_energy(const Robot& robot, const WorldOptions& options);
+/// Kinetic plus potential energy at the configuration of the last step [J], by the rule under which
+/// a free parabola keeps it exactly. Gravity's kick is staggered: the velocity of the semi-implicit
+/// step is half a kick ahead of its configuration, that of the energy-safe step half a kick behind
+/// while the ground pushes. Empty where that half kick belongs to a substep, whose length is
+/// unknown.
+std::optional<double> node_energy(const Robot& robot, const WorldOptions& options);
 
 }  // namespace stickslip::scenes

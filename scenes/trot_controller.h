@@ -46,16 +46,17 @@ class TrotController {
 
  private:
   struct Swing {
-    double progress = 0;  // 0..1 [1]
-    Vector3 from{};       // sphere center at lift-off, world [m]
-    bool landed = false;  // touched down before the planned end of this swing
+    double progress = 0;   // 0..1 [1]
+    Vector3 from{}, to{};  // sphere center at lift-off and at touch-down, world [m]
+    bool landed = false;   // touched down before the planned end of this swing
   };
   void plan(double time, std::span<const double> q, const std::array<LegState, kNumLegs>& legs);
   std::array<Vector3, kNumLegs> stance_forces(double speed, std::span<const double> q,
                                               std::span<const double> u,
                                               const std::array<LegState, kNumLegs>& legs) const;
-  Vector3 swing_torque(int leg, double speed, std::span<const double> q, std::span<const double> u,
-                       const LegState& state) const;
+  Vector3 foothold(int leg, double speed, std::span<const double> q,
+                   std::span<const double> u) const;
+  Vector3 swing_torque(int leg, std::span<const double> q, const LegState& state) const;
   double speed_command(double time, double speed);
   double lateral_command(std::span<const double> q) const;
 

@@ -62,16 +62,16 @@ void check_good(const Outcome& out, double seconds, double slip) {
 
 TEST(TrotKeepsRunningFor100SecondsAtItsSpeedWithoutSlipping) {
   const Outcome out = trot(options(1e-3), 100);
-  check_good(out, 100, 0.01);
+  check_good(out, 100, 0.003);  // asked for: 1 %
   CHECK_NEAR(out.statistics.distance / 100, 1.5, 0.1);
 }
 
 TEST(TrotRunsOnThePapersIntegratorToo) {
   const Outcome out = trot(options(1e-3, Integrator::kSemiImplicit), 20);
-  check_good(out, 20, 0.02);
+  check_good(out, 20, 0.003);
 }
 
-TEST(TrotRunsAtLargerSteps) { check_good(trot(options(4e-3), 20), 20, 0.03); }
+TEST(TrotRunsAtLargerSteps) { check_good(trot(options(4e-3), 20), 20, 0.003); }
 
 TEST(TrotSurvivesSidewaysPushes) {
   const Outcome out = trot(options(1e-3), 20, 0.3);
