@@ -329,7 +329,11 @@ void bind_builder(nb::module_& m) {
 
 void bind_model(nb::module_& m) {
   // A class of its own, so that callers can tell an unusable description from other bad values.
-  nb::exception<ModelError>(m, "ModelError", PyExc_ValueError).attr("__module__") = "stickslip";
+  const nb::exception<ModelError> error(m, "ModelError", PyExc_ValueError);
+  error.attr("__module__") = "stickslip";
+  error.attr("__doc__") =
+      "A description, a model or a problem is not usable; the text names the file, the element or "
+      "the argument.";
   bind_parts(m);
   bind_model_class(m);
   bind_builder(m);

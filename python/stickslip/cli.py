@@ -13,7 +13,7 @@ from stickslip import __version__
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="stickslip", description="Robots with hard contacts and exact friction.")
     parser.add_argument("--version", action="version", version=f"stickslip {__version__}")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    commands = parser.add_subparsers(dest="command", required=True)
 
     paper = commands.add_parser(
         "paper",

@@ -159,6 +159,9 @@ def test_frame_poses_and_jacobians_equal_pinocchios(path: Path, base: str) -> No
             pose = p.ours.frame_pose(str(name))
             _close(pose.position, p.data.oMf[frame].translation, f"position of {name}")
             _close(pose.rotation, p.data.oMf[frame].rotation, f"rotation of {name}")
+            if p.model.nv == 0:  # where Pinocchio crashes
+                assert p.ours.jacobian(str(name)).shape == (6, 0)
+                continue
             jacobian = pin.getFrameJacobian(p.model, p.data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
             _close(p.ours.jacobian(str(name)), jacobian @ p.turn.T, f"jacobian of {name}")
 

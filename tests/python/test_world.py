@@ -367,7 +367,7 @@ def test_overflow_raises_and_keeps_the_last_finite_state(ball: ss.Model) -> None
     calm = world.add_robot(ball, position=(0, 0, 5))
     wild = world.add_robot(ball, position=(5, 0, 5))
     force = np.zeros(6)
-    force[:3] = 1e308
+    force[3:] = 1e308  # on an inertia of 0.01 kg m^2: beyond the largest number
     wild.generalized_force = force
     with pytest.raises(ss.StepError, match=wild.name) as caught:
         world.step(100)
