@@ -19,6 +19,12 @@ DenseFactor factor_dense(const double* G, int size) {
     for (std::size_t i = 0; i < m; ++i)
       if (!done[i] && rest[i * m + i] > best) best = rest[i * m + i], pivot = i;
     if (pivot == m) break;
+    // A semidefinite rest has no entry above its largest diagonal one: what is left is rounding of
+    // the input.
+    double beside = 0;
+    for (std::size_t i = 0; i < m; ++i)
+      if (!done[i]) beside = std::fmax(beside, std::fabs(rest[i * m + pivot]));
+    if (beside > 2 * best) break;
     done[pivot] = 1;
     columns.resize((f.rank + 1) * m, 0);
     double* column = columns.data() + f.rank * m;
@@ -31,7 +37,7 @@ DenseFactor factor_dense(const double* G, int size) {
         for (std::size_t j = 0; j < m; ++j) rest[i * m + j] -= column[i] * column[j];
   }
   // A semidefinite rest with zero diagonal is zero.
-  double worst = 1e-8 * largest;
+  double worst = 1e-6 * largest;
   for (std::size_t i = 0; i < m; ++i)
     for (std::size_t j = 0; !done[i] && j < m; ++j)
       if (!done[j] && std::fabs(rest[i * m + j]) > worst)

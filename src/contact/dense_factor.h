@@ -15,7 +15,8 @@ struct DenseFactor {
 };
 
 /// `G` (size, size) row-major, symmetric. Pivots below 1e-14 of the largest diagonal entry count as
-/// zero; a rest above 1e-8 of it means that G is indefinite.
+/// zero. A rest above 1e-6 of it means that G is indefinite; below, that G was rounded to few
+/// digits (files), and Y Y^T is that much off.
 DenseFactor factor_dense(const double* G, int size);
 
 }  // namespace stickslip::contact

@@ -273,3 +273,16 @@ TEST(SolveContactAgreesWithSolve) {
     for (int k = 0; k < 3; ++k) CHECK_NEAR(a.impulse[k], b.impulse[k], 1e-8);
   }
 }
+
+TEST(MatricesRoundedToFewDigitsAreSolvedAsTheyAre) {
+  // A tower's singular G with entries rounded to 7 digits, as text files have them: slightly
+  // indefinite.
+  ContactProblem p = problems::tower({1, 2, 1}, 0.5, 1);
+  const double unit = 1e-7 * problems::largest(p.delassus);
+  for (double& x : p.delassus) x = std::round(x / unit) * unit;
+  const SolveResult r = solve(p);
+  std::printf("  residual %.1e, sweeps %d, Newton steps %d\n", r.residual, r.sweeps,
+              r.newton_steps);
+  CHECK(finite(r) && r.residual <= 1e-6);
+  CHECK((r.status == SolveStatus::kConverged) == (r.residual <= 1e-9));
+}
