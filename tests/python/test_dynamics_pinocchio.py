@@ -95,6 +95,12 @@ def _pairs(path: Path, base: str):
             yield _pair(path, base, speed, rng)
 
 
+def _solve_tolerance(path: Path) -> float:
+    """Of what is divided by the mass matrix. Tiago's casters weigh nothing beside its body: its mass matrix has condition 5e6,
+    of which any solver may lose so many times the rounding, 1e-9."""
+    return 1e-9 if path.stem == "tiago_no_hand" else TOLERANCE
+
+
 def _close(ours: np.ndarray, reference: np.ndarray, what: str, tolerance: float = TOLERANCE) -> None:
     """Largest difference against the largest element."""
     scale = np.abs(reference).max(initial=1e-12)
@@ -110,15 +116,12 @@ def test_mass_matrix_bias_force_and_accelerations_equal_pinocchios(path: Path, b
         mass = pin.crba(p.model, p.data, p.q).copy()
         mass = np.triu(mass) + np.triu(mass, 1).T
         bias = pin.nonLinearEffects(p.model, p.data, p.q, p.v).copy()
-        mass_matrix = p.ours.mass_matrix()
-        _close(mass_matrix, p.turn @ mass @ p.turn.T, "mass matrix")
+        _close(p.ours.mass_matrix(), p.turn @ mass @ p.turn.T, "mass matrix")
         _close(p.ours.bias_force(), p.turn @ (bias - mass @ p.drift), "bias force")
 
         tau = p.turn @ rng.normal(size=p.model.nv) * np.abs(bias).max(initial=1.0)
         acceleration = p.turn @ (pin.aba(p.model, p.data, p.q, p.v, p.turn.T @ tau) + p.drift)
-        # Light fingers on heavy bodies: what an exact solver may lose grows with the condition of the mass matrix.
-        lost = np.finfo(float).eps * np.linalg.cond(mass_matrix) if p.model.nv else 0.0
-        _close(p.ours.forward_dynamics(tau), acceleration, "accelerations", max(TOLERANCE, lost))
+        _close(p.ours.forward_dynamics(tau), acceleration, "accelerations", _solve_tolerance(path))
 
 
 @pytest.mark.parametrize("base", ["floating", "fixed"])
@@ -142,8 +145,7 @@ def test_delassus_operator_equals_pinocchios(path: Path, base: str) -> None:
         mass = pin.crba(p.model, p.data, p.q).copy()
         mass = np.triu(mass) + np.triu(mass, 1).T
         expected = stacked @ np.linalg.solve(mass, stacked.T) if p.model.nv else np.zeros((12, 12))
-        lost = np.finfo(float).eps * np.linalg.cond(mass) if p.model.nv else 0.0
-        _close(p.ours.delassus(bodies, points), expected, "Delassus operator", max(TOLERANCE, lost))
+        _close(p.ours.delassus(bodies, points), expected, "Delassus operator", _solve_tolerance(path))
 
 
 @pytest.mark.parametrize("base", ["floating", "fixed"])
