@@ -1,6 +1,7 @@
 # make run     installs into .venv and runs the paper's experiments (results in report/)
 # make test    all C++ and Python tests
 # make lint    formatting and kernel rules;  make format  mends the formatting
+# make bench   stickslip beside MuJoCo on the same tasks (BENCH="..." for its options)
 # make sanitize  C++ tests with address and undefined-behavior sanitizers
 #
 # Needs a C++20 compiler and Python >= 3.10 with venv; everything else comes into .venv with pip.
@@ -64,7 +65,9 @@ $(VENV)/dev: $(VENV)/tools
 	touch $@
 
 bench: $(VENV)/installed-test
-	$(BIN)/python benchmarks/compare/run.py
+	$(BIN)/cmake -S . -B $(BUILD) -DSTICKSLIP_BENCHMARKS=ON
+	$(BIN)/cmake --build $(BUILD)
+	$(BUILD)/benchmarks/compare/stickslip_compare $(BENCH)
 
 sanitize: $(VENV)/tools
 	$(BIN)/cmake -S . -B build/sanitize -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja -DPython_EXECUTABLE=$(abspath $(BIN))/python \
