@@ -196,6 +196,10 @@ class World {
 
   /// The explicit contact problem that the next step of a robot would solve (no contacts: empty).
   ContactProblem next_contact_problem(int robot);
+  /// The explicit contact problem that the last step of a robot solved (its last substep, where
+  /// there were several) and, if asked for, the impulses it found (3n) [N s]. Empty without
+  /// contacts.
+  ContactProblem last_contact_problem(int robot, std::vector<double>* impulse = nullptr) const;
 
   void set_profiling(bool on);
   const StageTimes& stage_times() const;

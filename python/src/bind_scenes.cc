@@ -2,11 +2,13 @@
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
+#include <stickslip/errors.h>
 #include <stickslip/world.h>
 
 #include <algorithm>
 
 #include "bindings.h"
+#include "scenes/experiments.h"
 #include "scenes/statistics.h"
 #include "scenes/tasks.h"
 
@@ -55,6 +57,70 @@ int run(Task& task, World& world, Robot& robot, long steps, Statistics* statisti
     if (PyErr_CheckSignals() != 0) throw nb::python_error();
   }
   return ended;
+}
+
+/// Runs `step` that often in C++, and lets Ctrl-C through.
+template <class Step>
+void repeat(long times, Step&& step) {
+  constexpr long kBetweenSignals = 2048;
+  for (long done = 0; done < times;) {
+    const long end = std::min(times, done + kBetweenSignals);
+    {
+      nb::gil_scoped_release free_interpreter;
+      for (; done < end; ++done) step();
+    }
+    if (PyErr_CheckSignals() != 0) throw nb::python_error();
+  }
+}
+
+/// (steps, 8): contacts, sweeps, Newton steps, residual, approach, penetration, converged, episode
+/// over; see StepRecord.
+ArrayOut record(Task& task, World& world, Robot& robot, long steps) {
+  std::vector<double> rows;
+  rows.reserve(8 * steps);
+  repeat(steps, [&] {
+    const scenes::StepRecord r = scenes::record_step(task, world, robot);
+    rows.insert(rows.end(),
+                {double(r.contacts), double(r.sweeps), double(r.newton_steps), r.residual,
+                 r.approach, r.penetration, double(r.converged), double(r.episode_over)});
+  });
+  return make_array({static_cast<std::size_t>(steps), 8},
+                    [&](std::span<double> to) { std::copy(rows.begin(), rows.end(), to.begin()); });
+}
+
+/// (delassus (k, 3, 3), free velocity (k, 3), friction (k,), steps, contacts looked at).
+nb::tuple sample_slipping(Task& task, World& world, Robot& robot, long wanted, long max_steps) {
+  scenes::SlipSamples s;
+  constexpr long kStepsAtOnce = 512;
+  repeat((max_steps + kStepsAtOnce - 1) / kStepsAtOnce,
+         [&] { scenes::sample_slipping(task, world, robot, wanted, kStepsAtOnce, s); });
+  const std::size_t n = s.friction.size();
+  const auto copy = [](const std::vector<double>& from) {
+    return [&from](std::span<double> to) { std::copy(from.begin(), from.end(), to.begin()); };
+  };
+  return nb::make_tuple(make_array({n, 3, 3}, copy(s.delassus)),
+                        make_array({n, 3}, copy(s.free_velocity)), copy_array(s.friction), s.steps,
+                        s.contacts);
+}
+
+/// A list of (delassus (3n, 3n), free velocity (3n,), friction (n,), impulse (3n,)).
+nb::list sample_problems(Task& task, World& world, Robot& robot, long steps, int stride) {
+  if (stride < 1) throw ModelError("sample_problems: stride must be at least 1");
+  std::vector<scenes::ProblemSample> samples;
+  {
+    nb::gil_scoped_release free_interpreter;
+    scenes::sample_problems(task, world, robot, steps, stride, samples);
+  }
+  nb::list out;
+  for (const auto& s : samples) {
+    const std::size_t rows = s.problem.free_velocity.size();
+    const auto copy = [&](std::span<double> to) {
+      std::copy(s.problem.delassus.begin(), s.problem.delassus.end(), to.begin());
+    };
+    out.append(nb::make_tuple(make_array({rows, rows}, copy), copy_array(s.problem.free_velocity),
+                              copy_array(s.problem.friction), copy_array(s.impulse)));
+  }
+  return out;
 }
 
 void bind_statistics(nb::module_& m) {
@@ -108,7 +174,10 @@ void bind_scenes(nb::module_& parent) {
       .def_prop_ro("time", &Task::time)
       .def_prop_ro("episode_length", [](const Task& t) { return t.spec().episode; })
       .def("reset", &Task::reset, "robot"_a, "episode"_a)
-      .def("run", &run, "world"_a, "robot"_a, "steps"_a, "statistics"_a.none() = nb::none());
+      .def("run", &run, "world"_a, "robot"_a, "steps"_a, "statistics"_a.none() = nb::none())
+      .def("record", &record, "world"_a, "robot"_a, "steps"_a)
+      .def("sample_slipping", &sample_slipping, "world"_a, "robot"_a, "wanted"_a, "max_steps"_a)
+      .def("sample_problems", &sample_problems, "world"_a, "robot"_a, "steps"_a, "stride"_a);
   bind_statistics(m);
 }
 

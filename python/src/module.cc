@@ -17,6 +17,12 @@ NB_MODULE(_core, m) {
     }
   });
 
+#if defined(__clang__)
+  m.attr("compiler") = "Clang " __clang_version__;
+#else
+  m.attr("compiler") = "GCC " __VERSION__;
+#endif
+
   stickslip::python::bind_model(m);
   stickslip::python::bind_contact(m);
   stickslip::python::bind_world(m);

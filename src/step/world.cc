@@ -199,6 +199,16 @@ ContactProblem World::next_contact_problem(int index) {
   return p;
 }
 
+ContactProblem World::last_contact_problem(int index, std::vector<double>* impulse) const {
+  const step::ContactStage& contacts = robot(index).impl_->data.contacts;
+  if (impulse) {
+    impulse->clear();
+    for (int i = 0; i < contacts.count(); ++i)
+      impulse->insert(impulse->end(), contacts.impulse(i), contacts.impulse(i) + 3);
+  }
+  return contacts.explicit_problem();
+}
+
 void World::set_profiling(bool on) { impl_->context.times = on ? &impl_->times : nullptr; }
 const StageTimes& World::stage_times() const { return impl_->times; }
 void World::reset_stage_times() { impl_->times = StageTimes{}; }
