@@ -13,13 +13,48 @@ inline constexpr int kHalleyCap = 80;
 
 enum class Method { kHalley, kBisection, kGoldenSection, kQuartic };
 
+/// S has rank below two, as `prepare` sees it.
+STICKSLIP_INLINE bool is_singular(const LocalContact<double>& k) {
+  const double det = nmadd(k.sxy, k.sxy, k.sxx * k.syy);
+  return !(det > singular_threshold<double>() * (k.sxx + k.syy) * (k.xx + k.yy));
+}
+
+/// The contact with S + 1e-11 trace(G) in place of S: a velocity error of 1e-11 |c|. A contact on a
+/// rail (G of rank one) whose velocity along the normal is prescribed has to slide; with S alone it
+/// has no stick impulse to start from, not even a far one.
+inline LocalContact<double> regularized(LocalContact<double> k) {
+  const double eps = 3e-11 * k.scale;
+  k.sxx += eps, k.syy += eps;
+  const double inverse = 1 / nmadd(k.sxy, k.sxy, k.sxx * k.syy);
+  k.ixx = k.syy * inverse, k.ixy = -k.sxy * inverse, k.iyy = k.sxx * inverse;
+  return k;
+}
+
+/// A closing contact with singular S whose pseudo-inverse does not stop it.
+STICKSLIP_INLINE bool must_slide(const LocalContact<double>& k, const Reduced<double>& r,
+                                 const double c[3]) {
+  const double vx = madd(k.sxx, r.x, madd(k.sxy, r.y, r.bx));
+  const double vy = madd(k.sxy, r.x, madd(k.syy, r.y, r.by));
+  const double speed2 = c[0] * c[0] + c[1] * c[1] + c[2] * c[2];
+  return (r.stick || r.slip) && vx * vx + vy * vy > 1e-20 * speed2;
+}
+
 /// The impulse [N s] of one contact whose velocity without it is c [m/s]. `evaluations` is 0 when
-/// it opens or sticks. Tolerance: kHalley: residual velocity [m/s]; the others: impulse interval [N
-/// s].
+/// it opens or sticks. Tolerance: kHalley: residual velocity [m/s]; the others: impulse interval
+/// [N s].
 template <Method method, bool kMaxDissipation>
-STICKSLIP_INLINE SlipSolution solve_single(const LocalContact<double>& k, const double c[3],
+STICKSLIP_INLINE SlipSolution solve_single(const LocalContact<double>& given, const double c[3],
                                            double tolerance) {
-  const Reduced<double> r = reduce(k, c[0], c[1], c[2]);
+  LocalContact<double> rail;
+  const LocalContact<double>* used = &given;
+  Reduced<double> r = reduce(given, c[0], c[1], c[2]);
+  if (is_singular(given) && must_slide(given, r, c)) [[unlikely]] {
+    rail = regularized(given);
+    const Reduced<double> far = reduce(rail, c[0], c[1], c[2]);
+    // Sticking by an impulse of 1e11 is jamming: no finite impulse solves it.
+    if (far.slip) used = &rail, r = far;
+  }
+  const LocalContact<double>& k = *used;
   if (r.stick) return {r.x, r.y, r.z, 0, true};
   if (!r.slip) return {0, 0, 0, 0, true};
   if (!(k.mu > 0)) return {0, 0, r.a, 0, true};

@@ -286,3 +286,35 @@ TEST(MatricesRoundedToFewDigitsAreSolvedAsTheyAre) {
   CHECK(finite(r) && r.residual <= 1e-6);
   CHECK((r.status == SolveStatus::kConverged) == (r.residual <= 1e-9));
 }
+
+TEST(AContactOnARailSlidesIfItsNormalVelocityIsPrescribed) {
+  // One degree of freedom along t: G = t t^T. The free velocity along t with an allowed approach
+  // added to its normal part is not in the range of G, so nothing stops the contact; it slides
+  // along t and friction opposes that. (Where mu |w| > 1 the rail may jam: no finite impulse does
+  // it.)
+  problems::Random rng(40);
+  for (int i = 0; i < 300; ++i) {
+    double t[2][3], c[3];
+    for (auto& row : t)
+      for (double& x : row) x = rng.normal();
+    const int rank = 1 + i % 2;
+    ContactProblem p{std::vector<double>(9), {}, {rng.uniform(0.1, 1)}};
+    for (int a = 0; a < 9; ++a)
+      for (int k = 0; k < rank; ++k) p.delassus[a] += t[k][a / 3] * t[k][a % 3];
+    const double along[2] = {rng.normal(), rng.normal()};
+    for (int a = 0; a < 3; ++a) {
+      c[a] = a == 2 ? rng.uniform(0, 1) : 0;
+      for (int k = 0; k < rank; ++k) c[a] += t[k][a] * along[k];
+    }
+    p.free_velocity.assign(c, c + 3);
+    if (p.friction[0] * std::hypot(p.delassus[2], p.delassus[5]) >= p.delassus[8]) continue;
+    for (const SolveMethod method : {SolveMethod::kAuto, SolveMethod::kPerContact})
+      for (const auto single : {SingleContactMethod::kHalley, SingleContactMethod::kBisection}) {
+        SolveOptions o;
+        o.method = method, o.single_contact = single;
+        const SolveResult r = solve(p, o);
+        CHECK(finite(r));
+        CHECK(r.status == SolveStatus::kConverged);
+      }
+  }
+}
