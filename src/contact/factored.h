@@ -68,7 +68,7 @@ STICKSLIP_INLINE S fixed_point_residual_squared(const LocalContact<S>& k, const 
 /// Largest squared residual of the contacts; writes their velocities. Four contacts at a time for a
 /// plain scalar.
 template <int M, bool kMaxDissipation, class S>
-STICKSLIP_INLINE S certify(FactoredProblem<S>& p) {
+STICKSLIP_STAGE S certify(FactoredProblem<S>& p) {
   constexpr int kLanes = kMaxDissipation ? 1 : kChunk<S>;
   using T = typename ChunkOf<S, kLanes != 1>::Type;
   const int n = p.size();
@@ -169,6 +169,11 @@ __attribute__((noinline)) void run_fallback(FactoredProblem<S>& p, Mask<S> lanes
     if (!get_lane(lanes, l)) continue;
     ++info.fallbacks;
     if constexpr (ScalarTraits<S>::kWidth == 1 && sizeof(S) == 8) {
+      // Prepared afresh, as a lane of a pack is below: the same bits either way.
+      for (int i = 0; i < p.size(); ++i) {
+        store(p.contact(i).lambda, p.contact(i).impulse);
+        prepare_contact<M>(p.contact(i));
+      }
       Fallback<M> fallback(p, tolerance);
       fallback.run();
       info.fallback_steps += fallback.steps();

@@ -14,6 +14,10 @@
 #include "contact/residual.h"
 #include "lane/row3.h"
 
+// A stage of the solve: one copy of machine code. Inlining a stage into every caller costs minutes
+// of compilation and gains nothing, a call being a nanosecond.
+#define STICKSLIP_STAGE inline __attribute__((noinline))
+
 namespace stickslip::contact {
 
 /// Shared dofs handled by one operation.

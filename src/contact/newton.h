@@ -84,7 +84,7 @@ STICKSLIP_INLINE void eliminate(NewtonBlock<T>& b, T alpha) {
 /// Elimination of all contacts, four at a time for a plain scalar: each contact's numbers are the
 /// same either way. `center`: proximal center (n, 3), or null where it is the present impulse.
 template <int M, class S>
-STICKSLIP_INLINE void eliminate_contacts(FactoredProblem<S>& p, S alpha, const S* center) {
+STICKSLIP_STAGE void eliminate_contacts(FactoredProblem<S>& p, S alpha, const S* center) {
   constexpr int kLanes = ScalarTraits<S>::kWidth == 1 ? 4 : 1;
   using T = Chunk<S>;
   const int n = p.size();
@@ -146,7 +146,7 @@ STICKSLIP_INLINE void gather_right_side(FactoredProblem<S>& p, S* rhs) {
 /// breakdown shows as a huge or non-finite x, which the caller rejects. This one keeps the matrix
 /// in registers, row by row in chunks.
 template <int M, class S>
-STICKSLIP_INLINE S* solve_fixed(FactoredProblem<S>& p) {
+STICKSLIP_STAGE S* solve_fixed(FactoredProblem<S>& p) {
   constexpr int K = kChunk<S>, kColumns = round_up(M, K) / K, kAll = round_up(M + 1, K) / K;
   const S zero = constant<S>(0), one = constant<S>(1), tiny = constant<S>(1e-30);
   S* x = p.scratch;
@@ -216,7 +216,7 @@ STICKSLIP_INLINE S* solve_fixed(FactoredProblem<S>& p) {
 
 /// The same for any number of shared dofs, in p.matrix.
 template <class S>
-STICKSLIP_INLINE S* solve_any(FactoredProblem<S>& p) {
+STICKSLIP_STAGE S* solve_any(FactoredProblem<S>& p) {
   constexpr int K = kChunk<S>;
   const S zero = constant<S>(0), one = constant<S>(1), tiny = constant<S>(1e-30);
   const int m = p.dofs(), stride = p.stride();
@@ -270,7 +270,7 @@ STICKSLIP_INLINE S* solve_shared(FactoredProblem<S>& p) {
 /// follows. A lane whose step is not finite or above 1e6 keeps its impulses: float lanes do meet a
 /// broken pivot.
 template <int M, class S>
-STICKSLIP_INLINE void newton_step(FactoredProblem<S>& p, Mask<S> live, S alpha) {
+STICKSLIP_STAGE void newton_step(FactoredProblem<S>& p, Mask<S> live, S alpha) {
   const S zero = constant<S>(0), one = constant<S>(1), huge = constant<S>(1e6);
   eliminate_contacts<M>(p, alpha, static_cast<const S*>(nullptr));
   const S* x = solve_shared<M>(p);

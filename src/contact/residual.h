@@ -23,7 +23,7 @@ STICKSLIP_INLINE S natural_map_residual_squared(const LocalContact<S>& k, const 
   const S norm = sqrt(madd(x, x, y * y));
   // Projection on the cone: inside, in the polar cone, or on the mantle.
   const S along = madd(k.mu, norm, z) / madd(k.mu, k.mu, one);
-  const auto inside = norm <= k.mu * z;
+  const auto inside = (norm <= k.mu * z) & (z >= zero);  // z apart: without friction mu z = 0
   const auto polar = k.mu * norm <= -z;
   const auto centered = norm > zero;
   const S f = select(centered, k.mu * along / select(centered, norm, one), zero);

@@ -64,7 +64,8 @@ STICKSLIP_INLINE void transpose_rows(FactoredContact<S>& c) {
 template <class S>
 STICKSLIP_INLINE void clear_inactive(FactoredContact<S>& c) {
   if constexpr (ScalarTraits<S>::kWidth > 1) {
-    const S zero = constant<S>(0), one = constant<S>(1);
+    // Not zero, so that it counts as opening; too small to show in a tolerance.
+    const S zero = constant<S>(0), one = constant<S>(1), tiny = constant<S>(1e-30);
     for (int k = 0; k < c.count; ++k) {
       c.y[k].x = select(c.active, c.y[k].x, zero);
       c.y[k].y = select(c.active, c.y[k].y, zero);
@@ -74,7 +75,7 @@ STICKSLIP_INLINE void clear_inactive(FactoredContact<S>& c) {
       c.private_block[i] =
           select(c.active, c.private_block[i], i == 0 || i == 3 || i == 5 ? one : zero);
     for (int r = 0; r < 3; ++r) {
-      c.offset[r] = select(c.active, c.offset[r], r == 2 ? one : zero);
+      c.offset[r] = select(c.active, c.offset[r], r == 2 ? tiny : zero);
       c.impulse[r] = select(c.active, c.impulse[r], zero);
     }
     c.friction = select(c.active, c.friction, zero);
@@ -83,7 +84,7 @@ STICKSLIP_INLINE void clear_inactive(FactoredContact<S>& c) {
 
 /// Blocks of one contact from its rows, and its warm start (brought back into the cone).
 template <int M, class S>
-STICKSLIP_INLINE void prepare_contact(FactoredContact<S>& c) {
+STICKSLIP_STAGE void prepare_contact(FactoredContact<S>& c) {
   const S zero = constant<S>(0), one = constant<S>(1);
   clear_inactive(c);
   transpose_rows<M>(c);
@@ -178,7 +179,7 @@ STICKSLIP_INLINE S visit(FactoredContact<S>& c, S* w, Mask<S> live, S speed) {
 /// One sweep over all contacts in their order; the largest squared velocity change per lane
 /// [m^2/s^2].
 template <int M, bool kMaxDissipation, class S>
-STICKSLIP_INLINE S sweep(FactoredProblem<S>& p, Mask<S> live, S speed) {
+STICKSLIP_STAGE S sweep(FactoredProblem<S>& p, Mask<S> live, S speed) {
   S change = constant<S>(0);
   for (int i = 0; i < p.size(); ++i)
     change = max(change, visit<M, kMaxDissipation>(p.contact(i), p.w, live, speed));
@@ -187,7 +188,7 @@ STICKSLIP_INLINE S sweep(FactoredProblem<S>& p, Mask<S> live, S speed) {
 
 /// w = w0 + sum Y^T lambda.
 template <int M, class S>
-STICKSLIP_INLINE void accumulate(FactoredProblem<S>& p) {
+STICKSLIP_STAGE void accumulate(FactoredProblem<S>& p) {
   for (int k = 0; k < p.stride(); k += kChunk<S>) store_chunk(p.w + k, load_chunk(p.w0 + k));
   for (int i = 0; i < p.size(); ++i) {
     S l[3];
