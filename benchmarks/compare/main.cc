@@ -1,0 +1,151 @@
+// stickslip and MuJoCo on the same tasks, interleaved, on one core. README.md has the rules.
+#include <sched.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <fstream>
+#include <sstream>
+
+#include "benchmarks/compare/report.h"
+#include "benchmarks/compare/robots.h"
+
+namespace stickslip::benchmarks {
+namespace {
+
+constexpr const char* kUsage =
+    "usage: stickslip_compare [options]\n"
+    "  --tasks A,B         only tasks whose name starts so, any case (default: all)\n"
+    "  --engines A,B       of semi_implicit, energy_safe, mujoco (default: all)\n"
+    "  --steps N           per repetition (default 20000)\n"
+    "  --repetitions N     counted ones; one more warms up (default 7)\n"
+    "  --robots FOLDER     example-robot-data's robots folder: adds other robots than ANYmal\n"
+    "  --urdf FILE         ANYmal's description\n"
+    "  --core N            pin to this core (default 1 where there is one, else 0; -1: none)\n"
+    "  --no-statistics     times only; nothing is checked\n"
+    "  --json FILE         write the results there too\n";
+
+struct Options {
+  Settings settings;
+  std::vector<std::string> tasks;
+  std::string urdf = STICKSLIP_ANYMAL, robots, json;
+  int core = -2;
+};
+
+std::vector<std::string> split(const std::string& list) {
+  std::vector<std::string> out;
+  std::stringstream stream(list);
+  for (std::string item; std::getline(stream, item, ',');) out.push_back(item);
+  return out;
+}
+
+long positive(const std::string& name, const std::string& text) {
+  char* end = nullptr;
+  const long value = std::strtol(text.c_str(), &end, 10);
+  if (*end || value < 1) throw std::invalid_argument(name + " needs a positive number");
+  return value;
+}
+
+Options parse(int argc, char** argv) {
+  Options o;
+  for (int k = 1; k < argc; ++k) {
+    const std::string name = argv[k];
+    if (name == "--no-statistics") {
+      o.settings.statistics = false;
+      continue;
+    }
+    if (name == "--help" || k + 1 == argc) throw std::invalid_argument(kUsage);
+    const std::string value = argv[++k];
+    if (name == "--tasks")
+      o.tasks = split(value);
+    else if (name == "--engines")
+      o.settings.engines = split(value);
+    else if (name == "--steps")
+      o.settings.steps = positive(name, value);
+    else if (name == "--repetitions")
+      o.settings.repetitions = static_cast<int>(positive(name, value));
+    else if (name == "--robots")
+      o.robots = value;
+    else if (name == "--urdf")
+      o.urdf = value;
+    else if (name == "--json")
+      o.json = value;
+    else if (name == "--core")
+      o.core = std::atoi(value.c_str());
+    else
+      throw std::invalid_argument("unknown option " + name + "\n" + kUsage);
+  }
+  for (const std::string& e : o.settings.engines)
+    if (e != "semi_implicit" && e != "energy_safe" && e != "mujoco")
+      throw std::invalid_argument("unknown engine '" + e + "'\n" + kUsage);
+  return o;
+}
+
+bool wanted(const Scenario& s, const std::vector<std::string>& tasks) {
+  const auto starts_so = [&](const std::string& t) {
+    return t.size() <= s.name.size() && strncasecmp(s.name.c_str(), t.c_str(), t.size()) == 0;
+  };
+  return tasks.empty() || std::any_of(tasks.begin(), tasks.end(), starts_so);
+}
+
+/// Pins this process; returns the core, or -1.
+int pin(int core) {
+  cpu_set_t set;
+  if (core == -2) {
+    sched_getaffinity(0, sizeof set, &set);
+    core = CPU_ISSET(1, &set) ? 1 : 0;
+  }
+  if (core < 0) return -1;
+  CPU_ZERO(&set);
+  CPU_SET(core, &set);
+  if (sched_setaffinity(0, sizeof set, &set) != 0) {
+    std::printf("could not pin to core %d; running unpinned\n", core);
+    return -1;
+  }
+  return core;
+}
+
+int run(const Options& o) {
+  std::vector<Scenario> scenarios = anymal_scenarios(o.urdf);
+  if (!o.robots.empty())
+    for (Scenario& s : robot_scenarios(o.robots)) scenarios.push_back(std::move(s));
+  std::erase_if(scenarios, [&](const Scenario& s) { return !wanted(s, o.tasks); });
+  if (scenarios.empty()) throw std::invalid_argument("no such task");
+
+  const int core = pin(o.core);
+  std::printf("one thread, core %d, double, dt = 1 ms, %ld steps x %d repetitions, in turns\n\n",
+              core, o.settings.steps, o.settings.repetitions);
+  print_header();
+  std::vector<ScenarioResult> results;
+  bool good = true;
+  double least_share = 1, disagreement = 0;
+  for (const Scenario& s : scenarios) {
+    results.push_back(measure(s, o.settings));
+    print_result(results.back());
+    good = print_faults(results.back()) && good;
+    least_share = std::min(least_share, results.back().core_share);
+    disagreement = std::max(disagreement, results.back().disagreement);
+  }
+  std::printf("\nmodels agree to %.1e; this thread had the core at least %.0f %% of the time\n",
+              disagreement, 100 * least_share);
+  if (!o.json.empty()) {
+    std::ofstream file(o.json);
+    file << to_json(results, o.settings);
+    if (!file.flush()) throw std::runtime_error("cannot write " + o.json);
+  }
+  return good ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace stickslip::benchmarks
+
+int main(int argc, char** argv) {
+  try {
+    return stickslip::benchmarks::run(stickslip::benchmarks::parse(argc, argv));
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "stickslip_compare: %s\n", error.what());
+    return 2;
+  }
+}
