@@ -226,16 +226,19 @@ STICKSLIP_STAGE S* solve_any(FactoredProblem<S>& p) {
   for (int i = 0; i < m; ++i) h[i * stride + i] = one;
   for (int i = 0; i < p.size(); ++i) {
     const FactoredContact<S>& c = p.contact(i);
-    for (int r = 0; r < 3; ++r)
-      for (int j = 0, k = 0; j < c.chunks; ++j)
-        for (; k < c.count && c.index[k] < c.chunk_start[j] + K; ++k) {
-          const S t =
-              reinterpret_cast<const S*>(c.yn + r * c.chunks + j)[c.index[k] - c.chunk_start[j]];
-          for (int q = 0; q < c.chunks; ++q) {
-            S* to = h + c.index[k] * stride + c.chunk_start[q];
-            store_chunk(to, madd_chunk<S>(c.yt[r * c.chunks + q], t, load_chunk(to)));
-          }
+    for (int j = 0, k = 0; j < c.chunks; ++j)
+      for (; k < c.count && c.index[k] < c.chunk_start[j] + K; ++k) {
+        const int lane = c.index[k] - c.chunk_start[j];
+        S t[3];
+        for (int r = 0; r < 3; ++r)
+          t[r] = reinterpret_cast<const S*>(c.yn + r * c.chunks + j)[lane];
+        for (int q = 0; q < c.chunks; ++q) {
+          S* to = h + c.index[k] * stride + c.chunk_start[q];
+          Chunk<S> v = load_chunk(to);
+          for (int r = 0; r < 3; ++r) v = madd_chunk<S>(c.yt[r * c.chunks + q], t[r], v);
+          store_chunk(to, v);
         }
+      }
   }
   for (int i = 0; i < m; ++i) h[i * stride + m] = x[i];
   for (int j = 0; j < m; ++j) {
