@@ -15,11 +15,11 @@ namespace stickslip::scenes {
 
 enum class TaskKind {
   kTrot,          ///< trotting at 1.5 m/s with TrotController (paper)
-  kHang,          ///< thrown at rest from 1 m, unactuated, only the feet collide (paper, peers)
-  kDrop,          ///< thrown at 1 m/s from 1 m, unactuated, until motion dies (paper, peers)
-  kRandom,        ///< PD to random targets of 1 rad^2 variance (paper, peers)
-  kStand,         ///< PD to the stance (peers)
-  kOpenLoopTrot,  ///< PD to an open-loop 2 Hz diagonal gait on the spot (peers' TROT)
+  kHang,          ///< thrown at rest from 1 m, unactuated, only the feet collide (paper, compare)
+  kDrop,          ///< thrown at 1 m/s from 1 m, unactuated, until motion dies (paper, compare)
+  kRandom,        ///< PD to random targets of 1 rad^2 variance (paper, compare)
+  kStand,         ///< PD to the stance (compare)
+  kOpenLoopTrot,  ///< PD to an open-loop 2 Hz diagonal gait on the spot (TROT of compare)
 };
 
 struct TaskSpec {

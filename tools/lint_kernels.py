@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks the kernel rules that a grep can see (docs/design: one source for double, SIMD lanes and GPU threads).
+"""Checks the kernel rules that a grep can see (CONTRIBUTING.md: one source for double, SIMD lanes and GPU threads).
 
 Kernel headers hold only our own arithmetic: no standard library, no libm, no Eigen, no approximate reciprocals, no
 exceptions, no allocation. Source files beside them may use the standard library, but nothing that makes bits depend on the

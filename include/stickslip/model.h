@@ -22,7 +22,7 @@ struct Pose {
 struct Inertial {
   double mass = 0;                              ///< [kg]
   Vector3 center_of_mass{0, 0, 0};              ///< [m]
-  std::array<double, 6> inertia{0, 0, 0, 0, 0, 0};  ///< xx xy xz yy yz zz about the centre of mass [kg m^2]
+  std::array<double, 6> inertia{0, 0, 0, 0, 0, 0};  ///< xx xy xz yy yz zz about the center of mass [kg m^2]
 };
 
 enum class BaseType { kFloating, kFixed };

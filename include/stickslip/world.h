@@ -150,7 +150,7 @@ class Robot {
   double mechanical_energy() const;
   Vector3 center_of_mass() const;    ///< [m]
   Vector3 linear_momentum() const;   ///< [kg m/s]
-  Vector3 angular_momentum() const;  ///< about the centre of mass [kg m^2/s]
+  Vector3 angular_momentum() const;  ///< about the center of mass [kg m^2/s]
   /// G = J M^-1 J^T (3n, 3n) row-major [1/kg] of n points fixed to bodies; points in world axes
   /// [m].
   void delassus(std::span<const int> bodies, std::span<const Vector3> points,

@@ -75,7 +75,7 @@ struct LinkConstants {
   K position[3];  // of the joint in the parent link's frame [m]
   K mass;         // [kg]
   K com[3];       // [m]
-  K inertia[6];   // about the centre of mass [kg m^2]
+  K inertia[6];   // about the center of mass [kg m^2]
 };
 
 /// The layout of a Model for kernels with up to `lanes_per_bundle` branches side by side. Double;

@@ -3,7 +3,7 @@
 //
 // Kernels use only what this folder defines: + - * /, madd, sqrt, compare, select, any/all and the
 // polynomials of math.h. Each is one correctly rounded IEEE 754 operation, so a lane's bits depend
-// neither on the width nor on its neighbours.
+// neither on the width nor on its neighbors.
 #pragma once
 
 #define STICKSLIP_INLINE inline __attribute__((always_inline))

@@ -83,7 +83,7 @@ Inertial merge(const std::vector<Inertial>& parts) {
     const double weight = with_mass == 1 ? 1 : part.mass / sum.mass;
     for (int k = 0; k < 3; ++k) sum.center_of_mass[k] += weight * part.center_of_mass[k];
   }
-  // Parallel-axis theorem: I += I_k + m_k (|d|^2 1 - d d^T), d from the common centre of mass to
+  // Parallel-axis theorem: I += I_k + m_k (|d|^2 1 - d d^T), d from the common center of mass to
   // the part's.
   for (const Inertial& part : parts) {
     Vector3 d;

@@ -79,7 +79,7 @@ template <class S>
 STICKSLIP_INLINE Spatial<S> operator*(const RigidInertia<S>& a, const Spatial<S>& v) {
   return {madd(a.rot, v.ang, cross(a.h, v.lin)), madd(v.lin, a.mass, -cross(a.h, v.ang))};
 }
-/// Inertia of a body with mass m, centre of mass c and inertia `about_com`, seen from the reference
+/// Inertia of a body with mass m, center of mass c and inertia `about_com`, seen from the reference
 /// point.
 template <class S>
 STICKSLIP_INLINE RigidInertia<S> inertia_at_reference(S m, const Vec3<S>& c,

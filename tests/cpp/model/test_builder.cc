@@ -48,7 +48,7 @@ void check_vector(const Vector3& a, const Vector3& b, double tolerance) {
 }  // namespace
 
 TEST(TwoPointMassesMergeToADumbbell) {
-  // Masses 1 and 3 kg at x = 0 and x = 4 m: centre of mass 3 m, inertia 1 * 9 + 3 * 1 = 12 kg m^2
+  // Masses 1 and 3 kg at x = 0 and x = 4 m: center of mass 3 m, inertia 1 * 9 + 3 * 1 = 12 kg m^2
   // about y and z, plus their own.
   ModelBuilder builder("dumbbell");
   builder.add_link("left", Inertial{1, {0, 0, 0}, {0.1, 0, 0, 0.1, 0, 0.1}});
