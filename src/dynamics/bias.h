@@ -1,6 +1,6 @@
 // Bias force h of M du/dt + h = tau by the recursive Newton-Euler algorithm [Featherstone 2008,
 // sec. 5.3], outward half: the force each link needs for zero joint accelerations. Uniform
-// translation of the base does not enter.
+// translation of the base does not enter (docs/theory/dynamics.md (D2), (D6)).
 #pragma once
 #include "dynamics/kinematics.h"
 

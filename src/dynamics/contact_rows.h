@@ -1,5 +1,6 @@
 // Rows Y = J L^-1 of one contact point, three at a time, climbing from the link to the base. No
-// dense J, no M^-1: G_ij = Y_i Y_j^T, and two points share only the joints above both.
+// dense J, no M^-1: G_ij = Y_i Y_j^T, and two points share only the joints above both
+// (docs/theory/dynamics.md (D16)-(D18)).
 #pragma once
 #include "dynamics/solve.h"
 

@@ -3,7 +3,7 @@
 //   s_i,
 // with I_A the articulated-body inertia [Featherstone 2008, sec. 6.5, 7.2]. All U_i are forces at
 // the base origin, so a row costs six numbers however deep the tree is. Why not the parent array:
-// docs/design/003-articulated-factor.md.
+// docs/design/003-articulated-factor.md. Proof: docs/theory/dynamics.md (D7)-(D10).
 #pragma once
 #include "dynamics/kinematics.h"
 

@@ -1,4 +1,5 @@
-// Outward passes: positions, inertias and velocities of all links [Featherstone 2008, ch. 4, 5].
+// Outward passes: positions, inertias and velocities of all links [Featherstone 2008, ch. 4, 5],
+// docs/theory/dynamics.md (D2)-(D5).
 #pragma once
 #include "dynamics/tree.h"
 #include "lane/math.h"

@@ -1,5 +1,6 @@
 // Products with the factor L of M = L^T L: generalized forces -> L-space -> velocities, and back.
-// In L-space kinetic energy is half a squared norm, and a contact is a row vector Y = J L^-1.
+// In L-space kinetic energy is half a squared norm, and a contact is a row vector Y = J L^-1
+// (docs/theory/dynamics.md (D11)-(D15)).
 #pragma once
 #include "dynamics/factor.h"
 

@@ -1,4 +1,4 @@
-// The default step: it neither sinks nor explodes (docs/theory/step.md).
+// The default step: it neither sinks nor explodes (docs/theory/step.md (S3)-(S14)).
 //
 // A step is a kick (gravity, drives, contact impulses, all at fixed q) and a drift (motion without
 // forces over h). The drift is exact in kinetic energy, linear momentum and angular momentum: a
@@ -147,7 +147,7 @@ class EnergySafeStep {
     return fastest;
   }
 
-  /// u_free = u + gravity + drives over h; leaves its link velocities and y = L u_free in the tree.
+  /// (S3) u_free = u + gravity + drives over h; leaves its link velocities and y = L u_free in the tree.
   void free_motion(double h) {
     double* free = robot_.u_free.data();
     std::copy(robot_.state.u.begin(), robot_.state.u.end(), free);
@@ -178,7 +178,7 @@ class EnergySafeStep {
     }
   }
 
-  /// u_plus = u_free + M^-1 J^T lambda; the tree's y becomes L u_plus.
+  /// (S5) u_plus = u_free + M^-1 J^T lambda; the tree's y becomes L u_plus.
   void contacts(double h) {
     ContactStage& c = robot_.contacts;
     robot_.u_plus = robot_.u_free;
@@ -237,7 +237,7 @@ class EnergySafeStep {
     for (int k = 0; k < nu_; ++k) out[k] *= limit / size;
   }
 
-  /// w = u+ + (h/2) a(q, u+ + (h/2) a1), q_new = q (+) h w; leaves w in u_free and positions at
+  /// (S7) w = u+ + (h/2) a(q, u+ + (h/2) a1), q_new = q (+) h w; leaves w in u_free and positions at
   /// q_new in the tree.
   void drift(double h, const Invariants& invariants) {
     const RobotState& s = robot_.state;
@@ -255,7 +255,7 @@ class EnergySafeStep {
     dynamics::compute_positions(t_, robot_.base_quaternion(q_new), robot_.joints(q_new));
   }
 
-  /// Lifts q_new out of the ground, with normal rows at q_new and the factor of q.
+  /// (S8) Lifts q_new out of the ground, with normal rows at q_new and the factor of q.
   void correct_overlap(Invariants& invariants) {
     ContactStage& c = robot_.contacts;
     if (c.count() == 0) return;
@@ -286,7 +286,7 @@ class EnergySafeStep {
     project(h, invariants);
     if (!offset_) gravity_acceleration();
     // Without contact the second half of gravity's kick completes u; in contact the ground will
-    // take part in it.
+    // take part in it (S14).
     s.pending_gravity = pushed_ ? 0.5 * h : 0;
     if (!pushed_) add_gravity(0.5 * h, u());
     timer_.end(&StageTimes::integrate);

@@ -88,7 +88,7 @@ struct StepContext {
 void integrate_configuration(const RobotData& robot, double* q, const double* v, double h);
 
 /// Joint-space diagonal that makes damping and PD control implicit over h: h (kd + damping) + h^2
-/// kp. Null if there is none.
+/// kp, docs/theory/step.md (S2). Null if there is none.
 const double* implicit_diagonal(RobotData& robot, double h);
 
 /// Generalized force of control over a step h at velocity u: user's force, PD (target - q - h u),

@@ -3,7 +3,7 @@
 //
 //   M (u+ - u) = dt (tau - h) + J^T lambda,   q+ = q (+) dt u+
 // Where we differ: damping and PD control are implicit in the rates; M is never inverted nor
-// formed.
+// formed (docs/theory/step.md (S1), (S2)).
 #include <algorithm>
 #include <cmath>
 
