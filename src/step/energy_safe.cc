@@ -147,7 +147,8 @@ class EnergySafeStep {
     return fastest;
   }
 
-  /// (S3) u_free = u + gravity + drives over h; leaves its link velocities and y = L u_free in the tree.
+  /// (S3) u_free = u + gravity + drives over h; leaves its link velocities and y = L u_free in the
+  /// tree.
   void free_motion(double h) {
     double* free = robot_.u_free.data();
     std::copy(robot_.state.u.begin(), robot_.state.u.end(), free);
@@ -237,8 +238,8 @@ class EnergySafeStep {
     for (int k = 0; k < nu_; ++k) out[k] *= limit / size;
   }
 
-  /// (S7) w = u+ + (h/2) a(q, u+ + (h/2) a1), q_new = q (+) h w; leaves w in u_free and positions at
-  /// q_new in the tree.
+  /// (S7) w = u+ + (h/2) a(q, u+ + (h/2) a1), q_new = q (+) h w; leaves w in u_free and positions
+  /// at q_new in the tree.
   void drift(double h, const Invariants& invariants) {
     const RobotState& s = robot_.state;
     double *w = robot_.u_free.data(), *plus = robot_.u_plus.data(), *a = robot_.delta.data();
