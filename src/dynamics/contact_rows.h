@@ -52,4 +52,22 @@ void compute_contact_rows(const Tree<S>& t, LinkIndex link, const Vec3<S>& point
   if (t.floating) solve_base_transposed(t.base, rows.base);
 }
 
+/// One row Y = J L^-1: the unit force `axis` at `point`. Calls put_joint(link, entry) for the
+/// joints from the link to the base and returns the six base entries in `base`.
+template <class S, class F>
+STICKSLIP_INLINE void compute_row(const Tree<S>& t, LinkIndex link, const Vec3<S>& point,
+                                  const Vec3<S>& axis, S base[6], F&& put_joint) {
+  Spatial<S> f{cross(point, axis), axis};
+  while (link.slot != kBaseSlot) {
+    const Spatial<S> s = field_of<S, Spatial>(t, link, &LinkState<Wide<S>>::axis);
+    const Spatial<S> u = field_of<S, Spatial>(t, link, &LinkState<Wide<S>>::arm);
+    const S z = dot(s, f) * lane_of<S>(t.links[link.slot].inv_root, link.lane);
+    f = nmadd(u, z, f);
+    put_joint(link, z);
+    link = t.slots[link.slot].parent[link.lane];
+  }
+  to_rows(f, base);
+  if (t.floating) solve_base_transposed(t.base, base);
+}
+
 }  // namespace stickslip::dynamics

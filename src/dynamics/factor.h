@@ -19,16 +19,20 @@ void factor_base(BaseState<S>& base) {
   m[3][3] = a.xx, m[4][3] = a.xy, m[4][4] = a.yy, m[5][3] = a.xz, m[5][4] = a.yz, m[5][5] = a.zz;
   for (int r = 0; r < 3; ++r)
     for (int c = 0; c < 3; ++c) m[3 + r][c] = i.al.m[3 * r + c];
+  // The square root stays off the chain from one row to the next: only the division is on it.
 #pragma GCC unroll 6
   for (int j = 5; j >= 0; --j) {
+    const S inverse = constant<S>(1) / m[j][j];
     base.diagonal[j] = sqrt(m[j][j]);
-    base.inv_diagonal[j] = constant<S>(1) / base.diagonal[j];
+    base.inv_diagonal[j] = base.diagonal[j] * inverse;
+#pragma GCC unroll 6
+    for (int k = 0; k < j; ++k) {
+      const S scaled = m[j][k] * inverse;
+#pragma GCC unroll 6
+      for (int n = 0; n <= k; ++n) m[k][n] = nmadd(scaled, m[j][n], m[k][n]);
+    }
 #pragma GCC unroll 6
     for (int k = 0; k < j; ++k) m[j][k] = m[j][k] * base.inv_diagonal[j];
-#pragma GCC unroll 6
-    for (int k = 0; k < j; ++k)
-#pragma GCC unroll 6
-      for (int n = 0; n <= k; ++n) m[k][n] = nmadd(m[j][k], m[j][n], m[k][n]);
   }
 }
 
@@ -51,10 +55,11 @@ void factor_mass_matrix(Tree<S>& t, const S* extra) {
       const Spatial<W> u = i * link.axis;
       W d = dot(u, link.axis);
       if (extra) d = d + load_lanes(extra, t.slots[slot].joint);
+      const W inverse = constant<W>(1) / d;
+      rest = without(i, u, u * inverse);
       link.root = sqrt(d);
-      link.inv_root = constant<W>(1) / link.root;
+      link.inv_root = link.root * inverse;
       link.arm = u * link.inv_root;
-      rest = without(i, link.arm);
     }
     add_to_parents<S, ArticulatedInertia>(t, b, rest, t.base.articulated,
                                           &LinkState<W>::from_children);

@@ -101,7 +101,7 @@ void multiply_lower(Tree<S>& t, const Vec3<S>& base_velocity, const S* rates) {
     Spatial<W> v = from_parents<S, Spatial>(t, b, t.base.velocity, &LinkState<W>::velocity);
     for (int slot = b.first_slot; slot < b.first_slot + b.length; ++slot) {
       LinkState<W>& link = t.links[slot];
-      const W from_parent = dot(link.arm.ang, v.ang, dot(link.arm.lin, v.lin + translation));
+      const W from_parent = dot(link.arm.ang, v.ang) + dot(link.arm.lin, v.lin + translation);
       link.x = madd(link.root, load_lanes(rates, t.slots[slot].joint), from_parent);
       v = link.velocity;
     }

@@ -16,6 +16,7 @@ using dynamics::kMaxLanes;
 using dynamics::LinkIndex;
 using dynamics::Tree;
 
+constexpr int kCorrectionSweeps = 50;
 constexpr double kReach = 2e-3;  // candidates this near take part whatever their speed [m]
 
 int flat(LinkIndex link) { return link.slot * kMaxLanes + link.lane; }
@@ -48,10 +49,11 @@ ContactStage::ContactStage(const Model& model, const dynamics::TreeLayout& layou
       index_(num_dofs_),
       memory_(nullptr, free_block),
       moved_(num_points_),
-      gaps_(num_points_),
+      gaps_(num_points_ + 3),
       displacement_(num_dofs_),
-      normal_(static_cast<size_t>(num_points_) * num_dofs_),
-      pushes_(num_points_) {
+      normal_(static_cast<size_t>(num_points_ + 3) * num_dofs_),
+      gram_(static_cast<size_t>(num_points_ + 3) * num_points_),
+      pushes_(num_points_ + 3) {
   const contact::FactoredCapacity capacity{std::max(num_points_, 1), num_dofs_};
   memory_.reset(aligned_block(contact::FactoredProblem<double>::required_bytes(capacity)));
   problem_.attach(memory_.get(), capacity);
@@ -383,44 +385,54 @@ bool ContactStage::correct_overlap(Tree<double>& tree, double clearance, double 
     overlap = overlap || gaps_[i] < -tolerance;
   }
   if (!overlap) return false;
-  // Normal rows, dense over base and joints: this is rare and small.
-  const int base_dofs = 6, m = num_dofs_;
-  const Mat3<double> frame = ground_frame();
+  // Normal rows, dof by dof: entry (k, i) at k * stride + i, so that everything below runs over
+  // contacts.
+  const int m = num_dofs_, stride = (count_ + 3) / 4 * 4;
+  double *z = normal_.data(), *x = pushes_.data(), *r = gaps_.data(), *gram = gram_.data();
+  std::fill(z, z + static_cast<size_t>(m) * stride, 0.0);
   for (int i = 0; i < count_; ++i) {
-    ActiveContact& a = active_[i];
-    dynamics::compute_contact_rows(tree, shapes_[a.shape].link, moved_[i], frame, a.rows);
-    double* z = normal_.data() + static_cast<size_t>(i) * m;
-    std::fill(z, z + m, 0.0);
+    double base[6];
+    dynamics::compute_row(tree, shapes_[active_[i].shape].link, moved_[i], {0.0, 0.0, 1.0}, base,
+                          [&](LinkIndex link, double entry) {
+                            z[(6 + tree.slots[link.slot].joint[link.lane]) * stride + i] = entry;
+                          });
     if (floating_)
-      for (int k = 0; k < 6; ++k) z[k] = a.rows.base[k].v.v[2];
-    for (int k = 0; k < a.rows.depth; ++k) {
-      const LinkIndex link = a.rows.path[k];
-      z[base_dofs + tree.slots[link.slot].joint[link.lane]] = a.rows.joint[k].v.v[2];
-    }
-    pushes_[i] = 0;
+      for (int k = 0; k < 6; ++k) z[k * stride + i] = base[k];
   }
-  // Projected Gauss-Seidel in L-space: d = Z^T x is kept, so a visit costs two dot products.
-  std::vector<double>& d = displacement_;
-  std::fill(d.begin(), d.end(), 0.0);
-  for (int sweep = 0; sweep < 50; ++sweep) {
+  for (int j = 0; j < count_; ++j) {  // columns of Z Z^T
+    double* column = gram + static_cast<size_t>(j) * stride;
+    std::fill(column, column + stride, 0.0);
+    for (int k = 0; k < m; ++k) {
+      const double* row = z + static_cast<size_t>(k) * stride;
+      if (row[j] == 0) continue;
+      for (int i = 0; i < stride; ++i) column[i] = madd(row[i], row[j], column[i]);
+    }
+  }
+  // Projected Gauss-Seidel; r = gap + Z Z^T x is kept.
+  std::fill(x, x + count_, 0.0);
+  for (int i = count_; i < stride; ++i) r[i] = 0;
+  for (int sweep = 0; sweep < kCorrectionSweeps; ++sweep) {
     double change = 0;
     for (int i = 0; i < count_; ++i) {
-      const double* z = normal_.data() + static_cast<size_t>(i) * m;
-      double square = 0, moved = gaps_[i];
-      for (int k = 0; k < m; ++k) square += z[k] * z[k], moved += z[k] * d[k];
-      if (!(square > 0)) continue;
-      const double next = std::max(0.0, pushes_[i] - moved / square), step = next - pushes_[i];
-      if (step == 0) continue;
-      pushes_[i] = next;
-      for (int k = 0; k < m; ++k) d[k] += step * z[k];
-      change = std::max(change, std::fabs(step) * square);
+      const double* column = gram + static_cast<size_t>(i) * stride;
+      if (!(column[i] > 0)) continue;
+      const double next = std::max(0.0, x[i] - r[i] / column[i]), step = next - x[i];
+      x[i] = next;
+      for (int j = 0; j < stride; ++j) r[j] = madd(column[j], step, r[j]);
+      change = std::max(change, std::fabs(step) * column[i]);
     }
-    if (change < 1e-9) break;
+    if (change < 0.1 * tolerance) break;
+  }
+  std::vector<double>& d = displacement_;
+  for (int k = 0; k < m; ++k) {
+    d[k] = 0;
+    for (int i = 0; i < count_; ++i)
+      d[k] = madd(z[static_cast<size_t>(k) * stride + i], x[i], d[k]);
   }
   for (int k = 0; k < 6; ++k) tree.base.x[k] = d[k];
   for (int slot = 0; slot < tree.num_slots; ++slot)
     for (int lane = 0; lane < kMaxLanes; ++lane)
-      set_lane(tree.links[slot].x, lane, d[base_dofs + tree.slots[slot].joint[lane]]);
+      set_lane(tree.links[slot].x, lane, d[6 + tree.slots[slot].joint[lane]]);
   return true;
 }
 

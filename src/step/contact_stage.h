@@ -106,7 +106,7 @@ class ContactStage {
   std::unique_ptr<char, void (*)(char*)> memory_;
   contact::FactoredProblem<double> problem_;
   std::vector<Vec3<double>> moved_;  // active points at the new configuration
-  std::vector<double> dense_, gaps_, displacement_, normal_, pushes_;
+  std::vector<double> dense_, gaps_, displacement_, normal_, gram_, pushes_;
 };
 
 }  // namespace stickslip::step
