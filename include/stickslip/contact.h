@@ -15,8 +15,13 @@ enum class FrictionLaw {
   kMaxDissipation,  ///< least kinetic energy of the contact point, [Hwangbo 2018] eq. 8
 };
 
-/// Method for one contact.
-enum class SingleContactMethod { kHalley, kBisection, kGoldenSection, kQuartic };
+/// Method for one contact (docs/theory/contact.md, section 3).
+enum class SingleContactMethod {
+  kHalley,         ///< safeguarded Halley steps on one quartic, no trigonometry; the default
+  kBisection,      ///< [Hwangbo 2018] Algorithm 1, corrected
+  kGoldenSection,  ///< [Preclik 2014]; kMaxDissipation only
+  kQuartic,        ///< closed form of the quartic; fails now and then, and says so
+};
 
 /// Method for several contacts.
 enum class SolveMethod {
@@ -46,21 +51,23 @@ enum class StopTest {
 /// semidefinite; `free_velocity` (3n) [m/s]; `friction` (n) [1], zero or positive; infinite and
 /// huge values count as 1e4.
 struct ContactProblem {
-  std::vector<double> delassus;
-  std::vector<double> free_velocity;
-  std::vector<double> friction;
+  std::vector<double> delassus;       ///< (3n, 3n) row-major [1/kg]
+  std::vector<double> free_velocity;  ///< (3n) [m/s]
+  std::vector<double> friction;       ///< (n) [1]
+  /// n, as many as `friction` has.
   int num_contacts() const { return static_cast<int>(friction.size()); }
   /// Throws ModelError that names the argument and its first offending index (lengths, NaN,
   /// asymmetry, negative diagonal, indefinite matrix, negative friction).
   void validate() const;
 };
 
+/// How to solve a problem, and how far.
 struct SolveOptions {
   SolveMethod method = SolveMethod::kAuto;
   FrictionLaw law = FrictionLaw::kCoulomb;  ///< kPgs knows kCoulomb only
   double tolerance =
       1e-9;  ///< on the largest contact residual [m/s], or on the sum that `stop` names
-  int max_sweeps = 1000;
+  int max_sweeps = 1000;  ///< >= 1; kAuto: an upper bound that it rarely meets
   /// kPerContact only. kGoldenSection minimizes an energy, so it knows kMaxDissipation only.
   SingleContactMethod single_contact = SingleContactMethod::kHalley;
   double single_contact_tolerance =
@@ -71,17 +78,18 @@ struct SolveOptions {
   double gamma = 1.0;      ///< kPerContact: decay per sweep (0.99 in the paper); 1 keeps alpha
   StopTest stop =
       StopTest::kResidual;  ///< kPerContact and kPgs; the status looks at the residual in any case
-  bool record_history = false;
-  void validate() const;  ///< throws ModelError
+  bool record_history = false;  ///< fill SolveResult::history; costs an allocation per sweep
+  void validate() const;        ///< throws ModelError that names the option
 };
 
+/// What a solve returns: the best impulse found, with its certificate.
 struct SolveResult {
   std::vector<double> impulse;            ///< (3n) [N s]
   std::vector<double> velocity;           ///< G impulse + c (3n) [m/s]
   std::vector<double> contact_residuals;  ///< (n) [m/s]
   double residual = 0;                    ///< the largest of them [m/s]
-  int sweeps = 0;
-  int newton_steps = 0;
+  int sweeps = 0;                         ///< passes over all contacts
+  int newton_steps = 0;                   ///< kAuto: of the finish and the fallback
   SolveStatus status = SolveStatus::kNotConverged;
   /// If recorded: the value of the stop test after each sweep; kAuto: the residual after each
   /// stage.
@@ -99,6 +107,7 @@ SolveResult solve(const ContactProblem& problem, const SolveOptions& options = {
 std::vector<double> residual(const ContactProblem& problem, const std::vector<double>& impulse,
                              FrictionLaw law = FrictionLaw::kCoulomb);
 
+/// How to solve one contact.
 struct SingleContactOptions {
   SingleContactMethod method = SingleContactMethod::kHalley;
   FrictionLaw law = FrictionLaw::kCoulomb;
@@ -106,14 +115,15 @@ struct SingleContactOptions {
       1e-10;  ///< kHalley: residual velocity relative to |c|; the others: impulse interval [N s]
 };
 
+/// The impulse of one contact, and what it took.
 struct SingleContactResult {
-  double impulse[3];      ///< [N s]
+  double impulse[3];      ///< x, y, z (normal) [N s]
   int evaluations = 0;    ///< of the gradient or energy; 0 when open or sticking
   bool converged = true;  ///< false: the method failed; the impulse is the best point it saw
 };
 
-/// Solves one contact: `delassus` row-major 3x3 [1/kg], `free_velocity` (3) [m/s]. Throws
-/// ModelError for bad input.
+/// Solves one contact: `delassus` row-major 3x3 [1/kg], `free_velocity` (3) [m/s], `friction`
+/// >= 0 [1]. Throws ModelError for bad input.
 SingleContactResult solve_contact(const double delassus[9], const double free_velocity[3],
                                   double friction, const SingleContactOptions& options = {});
 

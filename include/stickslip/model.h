@@ -8,6 +8,7 @@
 
 namespace stickslip {
 
+/// x, y, z.
 using Vector3 = std::array<double, 3>;
 /// Row-major rotation matrix.
 using Matrix3 = std::array<double, 9>;
@@ -25,8 +26,11 @@ struct Inertial {
   std::array<double, 6> inertia{0, 0, 0, 0, 0, 0};  ///< xx xy xz yy yz zz about the center of mass [kg m^2]
 };
 
+/// Whether body 0 moves freely or is part of the world.
 enum class BaseType { kFloating, kFixed };
+/// What a moving joint does; kContinuous is a revolute joint without position limits.
 enum class JointType { kRevolute, kContinuous, kPrismatic };
+/// Kinds of collision shapes; a kMesh is kept as a reference and makes no contact.
 enum class ShapeType { kSphere, kBox, kCylinder, kCapsule, kMesh };
 
 /// One moving joint. Joint `j` carries body `j + 1`.
@@ -87,8 +91,11 @@ class Model {
   const std::vector<Shape>& shapes() const { return shapes_; }
   /// What was accepted although it looks wrong, or read but not followed; one sentence each, naming the element.
   const std::vector<std::string>& warnings() const { return warnings_; }
+  /// Moving joints.
   int num_joints() const { return static_cast<int>(joints_.size()); }
+  /// Length of q.
   int nq() const { return num_joints() + (base_ == BaseType::kFloating ? 7 : 0); }
+  /// Length of u.
   int nu() const { return num_joints() + (base_ == BaseType::kFloating ? 6 : 0); }
   double mass() const;  ///< of all bodies; of a fixed base, without body 0 [kg]
 
@@ -108,13 +115,14 @@ class Model {
   std::vector<std::string> warnings_;
 };
 
+/// Models are shared: every robot made from one holds it.
 using ModelPtr = std::shared_ptr<const Model>;
 
 /// Reads a robot from a URDF file. Fixed joints are merged into their parents, and their links stay as frames.
 /// Throws FileError or ModelError (names the file, the element and what to do).
 ModelPtr load_urdf(const std::string& path, BaseType base = BaseType::kFloating);
 
-/// Reads a robot from URDF text; `source` is what errors call it.
+/// Reads a robot from URDF text; `source` is what errors call it. Throws ModelError.
 ModelPtr parse_urdf(const std::string& xml, BaseType base = BaseType::kFloating,
                     const std::string& source = "<string>");
 

@@ -7,6 +7,7 @@
 
 namespace stickslip {
 
+/// Joint types of a description.
 enum class LinkJointType { kFixed, kRevolute, kContinuous, kPrismatic };
 
 /// A joint as a description gives it, fixed ones included.
@@ -18,7 +19,7 @@ struct LinkJoint {
   Pose pose;              ///< joint frame in the parent link's frame
   Vector3 axis{1, 0, 0};  ///< in the joint frame; normalized on the way in
   double lower, upper, velocity_limit, effort_limit;  ///< [rad or m], [rad/s or m/s], [N m or N]
-  double damping = 0, friction = 0;
+  double damping = 0, friction = 0;  ///< viscous [N m s/rad or N s/m], dry [N m or N]
   LinkJoint();  ///< limits start infinite
 };
 
@@ -30,6 +31,7 @@ class ModelBuilder {
   /// Adds a link; without an inertial it must end up merged into one that has, or into the root of
   /// a fixed-base robot.
   void add_link(const std::string& name, std::optional<Inertial> inertial = std::nullopt);
+  /// Adds a joint; its links may come later.
   void add_joint(LinkJoint joint);
   /// Adds a collision shape to a link; `shape.body` is ignored, `shape.pose` is in the link's
   /// frame. An empty `shape.name` becomes the link's name and the shape's index there.

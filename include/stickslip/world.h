@@ -31,7 +31,7 @@ struct MaterialPair {
 
 /// How the contact impulses of a step are found.
 struct StepSolverOptions {
-  SolveMethod method = SolveMethod::kAuto;
+  SolveMethod method = SolveMethod::kAuto;  ///< kPgs: law kCoulomb only
   FrictionLaw law = FrictionLaw::kCoulomb;
   SingleContactMethod single_contact = SingleContactMethod::kHalley;  ///< kPerContact only
   double tolerance = 1e-9;           ///< absolute part of the stopping test [m/s]
@@ -39,25 +39,27 @@ struct StepSolverOptions {
   int max_sweeps = 100'000;          ///< kPerContact, kPgs
   double alpha = 1.0, alpha_min = 0.7,
          gamma = 0.99;  ///< kPerContact, kPgs (alpha only); see SolveOptions
-  bool warm_start = true;
+  bool warm_start = true;  ///< start at the impulses of the last step
 };
 
+/// Options of a world; fixed once it is made.
 struct WorldOptions {
   double time_step = 1e-3;       ///< [s]
   Vector3 gravity{0, 0, -9.81};  ///< [m/s^2]
   Integrator integrator = Integrator::kEnergySafe;
-  StepSolverOptions solver;
+  StepSolverOptions solver;  ///< how contact impulses are found
   int max_substeps =
       8;  ///< kEnergySafe: a step is cut into at most this many parts when bodies turn fast
   void validate() const;  ///< throws ModelError that names the option
 };
 
+/// Where and how a robot is added.
 struct RobotOptions {
   std::string name;           ///< empty: the model's name, made unique
   Vector3 position{0, 0, 0};  ///< of the base [m]; of a fixed base too
   std::array<double, 4> orientation{1, 0, 0,
                                     0};  ///< of the base, w x y z; normalized on the way in
-  std::string material = "default";
+  std::string material = "default";  ///< of shapes that name none; see set_material_pair
 };
 
 /// Bits a step reports. Nothing is dropped silently.
@@ -87,9 +89,9 @@ struct Contact {
 struct StepInfo {
   StepStatus status = StepStatus::kOk;
   int contacts = 0;  ///< candidates in the solve
-  int sweeps = 0;
-  int newton_steps = 0;
-  int substeps = 1;
+  int sweeps = 0;        ///< passes over all contacts
+  int newton_steps = 0;  ///< of the solver's finish and fallback; kAuto only
+  int substeps = 1;      ///< kEnergySafe: parts the step was cut into
   double residual = 0;  ///< largest contact residual [m/s]
 };
 
@@ -98,21 +100,23 @@ struct StageTimes {
   double dynamics = 0;   ///< kinematics, bias, mass matrix factor, free velocity
   double detection = 0;  ///< candidates and gaps
   double delassus = 0;   ///< rows Y and the contact problem
-  double solve = 0;
+  double solve = 0;      ///< contact impulses
   double integrate = 0;  ///< final velocity, drift, position correction
-  long steps = 0;
+  long steps = 0;        ///< time steps counted
 };
 
 class World;
 
-/// A robot in a world. References stay valid as long as the world.
+/// A robot in a world, made by `World::add_robot`. References stay valid as long as the world. Functions
+/// with an `out` throw ModelError where it has the wrong length; those that take a frame name throw
+/// ModelError that lists the names.
 class Robot {
  public:
   ~Robot();
-  const std::string& name() const;
+  const std::string& name() const;  ///< in its world
   const Model& model() const;
-  ModelPtr model_ptr() const;
-  double time() const;
+  ModelPtr model_ptr() const;  ///< the same model, shared
+  double time() const;         ///< of its state [s]
 
   std::span<const double> q() const;  ///< (nq), see Model
   std::span<const double> u() const;  ///< (nu), see Model
@@ -123,20 +127,22 @@ class Robot {
   /// Generalized force [N, N m] (nu), kept until changed. Throws ModelError for a wrong length or
   /// NaN.
   void set_generalized_force(std::span<const double> tau);
-  std::span<const double> generalized_force() const;
+  std::span<const double> generalized_force() const;  ///< (nu) [N, N m], order and axes of u
   /// Joint PD control tau = kp (target - q) - kd u, taken implicitly in the rates so that no gain
-  /// is too stiff for the step. kp [N m/rad or N/m], kd [N m s/rad or N s/m] (joints), >= 0.
+  /// is too stiff for the step. kp [N m/rad or N/m], kd [N m s/rad or N s/m] (joints), >= 0. Throws
+  /// ModelError for a wrong length, NaN or a negative gain.
   void set_pd_gains(std::span<const double> kp, std::span<const double> kd);
-  std::span<const double> pd_kp() const;
-  std::span<const double> pd_kd() const;
+  std::span<const double> pd_kp() const;               ///< (joints)
+  std::span<const double> pd_kd() const;               ///< (joints)
   void set_pd_target(std::span<const double> target);  ///< (joints) [rad or m]
-  std::span<const double> pd_target() const;
+  std::span<const double> pd_target() const;           ///< (joints) [rad or m]
 
   void mass_matrix(std::span<double> out) const;  ///< row-major (nu, nu) [kg, kg m, kg m^2]
   /// h in M du/dt + h = tau: gravity, Coriolis and centrifugal forces (nu) [N, N m]. Without
   /// damping and control.
   void bias_force(std::span<double> out) const;
-  /// Accelerations du/dt without contacts for generalized forces tau (nu) -> (nu).
+  /// Accelerations du/dt (nu) [m/s^2, rad/s^2] without contacts, for generalized forces tau (nu)
+  /// [N, N m].
   void forward_dynamics(std::span<const double> tau, std::span<double> out) const;
   /// Rows 0-2: velocity of the frame's origin, rows 3-5: angular velocity, world axes; row-major
   /// (6, nu).
@@ -156,7 +162,7 @@ class Robot {
   void delassus(std::span<const int> bodies, std::span<const Vector3> points,
                 std::span<double> out) const;
 
-  const StepInfo& info() const;
+  const StepInfo& info() const;               ///< of the last step
   std::span<const Contact> contacts() const;  ///< of the last step
 
  private:
@@ -166,27 +172,32 @@ class Robot {
   std::unique_ptr<Impl> impl_;
 };
 
+/// Gravity, a ground, robots. Belongs to one thread at a time.
 class World {
  public:
-  explicit World(const WorldOptions& options = {});
+  explicit World(const WorldOptions& options = {});  ///< throws ModelError for bad options
   ~World();
   World(World&&) noexcept;
   World& operator=(World&&) noexcept;
 
-  /// A horizontal plane that fills everything below z = height [m]. One per world.
+  /// A horizontal plane that fills everything below z = height [m]. Throws ModelError for
+  /// a second one or a height that is not finite.
   void add_ground(double height = 0, const std::string& material = "default");
-  /// Adds a robot at its zero configuration (base as the options say). A failed call leaves the
-  /// world as it was.
+  /// Adds a robot at its zero configuration (base as the options say), at rest. Throws ModelError for
+  /// a null model, a name that is taken or a pose that is not finite; the world is then as it was.
   Robot& add_robot(ModelPtr model, const RobotOptions& options = {});
+  /// Sets how two materials meet, in either order, now and for what is added later. Throws ModelError
+  /// for values out of range.
   void set_material_pair(const std::string& a, const std::string& b, const MaterialPair& pair);
 
   int num_robots() const;
-  Robot& robot(int index);
+  Robot& robot(int index);  ///< in the order of adding; throws ModelError if there is none
   const Robot& robot(int index) const;
   double time() const;  ///< [s]
   const WorldOptions& options() const;
 
   /// Advances every robot by `steps` time steps; returns the status bits of all of them, or-ed.
+  /// Never throws for what happens in a step; ModelError for a negative number.
   StepStatus step(int steps = 1);
 
   /// Everything that changes in a step, as bytes; `load_state` replays bit for bit. Throws
@@ -201,8 +212,8 @@ class World {
   /// contacts.
   ContactProblem last_contact_problem(int robot, std::vector<double>* impulse = nullptr) const;
 
-  void set_profiling(bool on);
-  const StageTimes& stage_times() const;
+  void set_profiling(bool on);  ///< counts the time of each stage from now on, a little slower
+  const StageTimes& stage_times() const;  ///< since the last reset
   void reset_stage_times();
 
  private:
