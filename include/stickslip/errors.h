@@ -5,8 +5,8 @@
 
 namespace stickslip {
 
-/// A robot description, a model or a contact problem is not usable. The text names the file, element or argument,
-/// says what is wrong with it and what to do. Python sees a `ValueError`.
+/// A robot description, a model or a contact problem is not usable. The text names the file,
+/// element or argument, says what is wrong with it and what to do. Python sees a `ValueError`.
 class ModelError : public std::invalid_argument {
  public:
   using std::invalid_argument::invalid_argument;

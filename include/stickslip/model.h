@@ -1,5 +1,6 @@
-// The immutable description of one robot: a tree of rigid bodies, its joints, frames and collision shapes.
-// Plain double data in URDF conventions; the kernels derive their own layout from it (src/dynamics/tree_layout.h).
+// The immutable description of one robot: a tree of rigid bodies, its joints, frames and collision
+// shapes. Plain double data in URDF conventions; the kernels derive their own layout from it
+// (src/dynamics/tree_layout.h).
 #pragma once
 #include <array>
 #include <memory>
@@ -21,9 +22,10 @@ struct Pose {
 
 /// Mass properties of one body in its body frame.
 struct Inertial {
-  double mass = 0;                              ///< [kg]
-  Vector3 center_of_mass{0, 0, 0};              ///< [m]
-  std::array<double, 6> inertia{0, 0, 0, 0, 0, 0};  ///< xx xy xz yy yz zz about the center of mass [kg m^2]
+  double mass = 0;                  ///< [kg]
+  Vector3 center_of_mass{0, 0, 0};  ///< [m]
+  std::array<double, 6> inertia{0, 0, 0,
+                                0, 0, 0};  ///< xx xy xz yy yz zz about the center of mass [kg m^2]
 };
 
 /// Whether body 0 moves freely or is part of the world.
@@ -37,15 +39,17 @@ enum class ShapeType { kSphere, kBox, kCylinder, kCapsule, kMesh };
 struct Joint {
   std::string name;
   JointType type = JointType::kRevolute;
-  int parent_body = 0;       ///< index of the body the joint hangs on; always smaller than the child's index
-  Pose pose;                 ///< joint frame (= child body frame at q = 0) in the parent body frame
-  Vector3 axis{0, 0, 1};     ///< unit axis in the joint frame
-  double lower = 0;          ///< position limit [rad or m]; -inf where the joint has none
-  double upper = 0;          ///< position limit [rad or m]; +inf where the joint has none
-  double velocity_limit = 0; ///< [rad/s or m/s]; +inf where the joint has none
-  double effort_limit = 0;   ///< [N m or N]; +inf where the joint has none
-  double damping = 0;        ///< viscous [N m s/rad or N s/m]
-  double friction = 0;       ///< dry friction of the description [N m or N]; read and kept, not simulated yet
+  int parent_body =
+      0;      ///< index of the body the joint hangs on; always smaller than the child's index
+  Pose pose;  ///< joint frame (= child body frame at q = 0) in the parent body frame
+  Vector3 axis{0, 0, 1};      ///< unit axis in the joint frame
+  double lower = 0;           ///< position limit [rad or m]; -inf where the joint has none
+  double upper = 0;           ///< position limit [rad or m]; +inf where the joint has none
+  double velocity_limit = 0;  ///< [rad/s or m/s]; +inf where the joint has none
+  double effort_limit = 0;    ///< [N m or N]; +inf where the joint has none
+  double damping = 0;         ///< viscous [N m s/rad or N s/m]
+  double friction =
+      0;  ///< dry friction of the description [N m or N]; read and kept, not simulated yet
 };
 
 /// One rigid body: a URDF link with everything merged that is fixed to it.
@@ -64,23 +68,27 @@ struct Frame {
 
 /// A collision shape fixed to a body.
 struct Shape {
-  std::string name;  ///< name of the URDF link it was given with, and its index there, as in "LF_FOOT/0"
+  std::string
+      name;  ///< name of the URDF link it was given with, and its index there, as in "LF_FOOT/0"
   ShapeType type = ShapeType::kSphere;
   int body = 0;
-  Pose pose;                 ///< shape frame in the body frame
-  /// Box: full side lengths; sphere: {radius}; cylinder, capsule: {radius, length}, along z, without the caps [m].
+  Pose pose;  ///< shape frame in the body frame
+  /// Box: full side lengths; sphere: {radius}; cylinder, capsule: {radius, length}, along z,
+  /// without the caps [m].
   Vector3 size{0, 0, 0};
-  std::string mesh_file;     ///< mesh: file reference as written in the description
+  std::string mesh_file;  ///< mesh: file reference as written in the description
   Vector3 mesh_scale{1, 1, 1};
-  std::string material;      ///< contact material; empty: the robot's
+  std::string material;  ///< contact material; empty: the robot's
 };
 
-/// A robot. Immutable: made by `ModelBuilder::build` or `load_urdf`, shared by every world that holds it.
+/// A robot. Immutable: made by `ModelBuilder::build` or `load_urdf`, shared by every world that
+/// holds it.
 ///
-/// Generalized position `q`: floating base position (3) [m], base quaternion w x y z (4), joints [rad or m]; a fixed base
-/// has the joints only. Generalized velocity `u`: base linear velocity (3) [m/s] and angular velocity (3) [rad/s], both of the
-/// base origin in world axes, then joint rates. Joints are in depth-first order, siblings by name.
-/// Joints that mimic another in a URDF are independent here, as Pinocchio's are by default; `warnings` names them.
+/// Generalized position `q`: floating base position (3) [m], base quaternion w x y z (4), joints
+/// [rad or m]; a fixed base has the joints only. Generalized velocity `u`: base linear velocity (3)
+/// [m/s] and angular velocity (3) [rad/s], both of the base origin in world axes, then joint rates.
+/// Joints are in depth-first order, siblings by name. Joints that mimic another in a URDF are
+/// independent here, as Pinocchio's are by default; `warnings` names them.
 class Model {
  public:
   const std::string& name() const { return name_; }
@@ -89,7 +97,8 @@ class Model {
   const std::vector<Joint>& joints() const { return joints_; }
   const std::vector<Frame>& frames() const { return frames_; }
   const std::vector<Shape>& shapes() const { return shapes_; }
-  /// What was accepted although it looks wrong, or read but not followed; one sentence each, naming the element.
+  /// What was accepted although it looks wrong, or read but not followed; one sentence each, naming
+  /// the element.
   const std::vector<std::string>& warnings() const { return warnings_; }
   /// Moving joints.
   int num_joints() const { return static_cast<int>(joints_.size()); }
@@ -99,8 +108,8 @@ class Model {
   int nu() const { return num_joints() + (base_ == BaseType::kFloating ? 6 : 0); }
   double mass() const;  ///< of all bodies; of a fixed base, without body 0 [kg]
 
-  int joint_index(const std::string& name) const;  ///< throws ModelError that lists the names
-  int body_index(const std::string& name) const;   ///< throws ModelError that lists the names
+  int joint_index(const std::string& name) const;     ///< throws ModelError that lists the names
+  int body_index(const std::string& name) const;      ///< throws ModelError that lists the names
   const Frame& frame(const std::string& name) const;  ///< throws ModelError that lists the names
 
  private:
@@ -118,8 +127,8 @@ class Model {
 /// Models are shared: every robot made from one holds it.
 using ModelPtr = std::shared_ptr<const Model>;
 
-/// Reads a robot from a URDF file. Fixed joints are merged into their parents, and their links stay as frames.
-/// Throws FileError or ModelError (names the file, the element and what to do).
+/// Reads a robot from a URDF file. Fixed joints are merged into their parents, and their links stay
+/// as frames. Throws FileError or ModelError (names the file, the element and what to do).
 ModelPtr load_urdf(const std::string& path, BaseType base = BaseType::kFloating);
 
 /// Reads a robot from URDF text; `source` is what errors call it. Throws ModelError.

@@ -20,7 +20,7 @@ struct LinkJoint {
   Vector3 axis{1, 0, 0};  ///< in the joint frame; normalized on the way in
   double lower, upper, velocity_limit, effort_limit;  ///< [rad or m], [rad/s or m/s], [N m or N]
   double damping = 0, friction = 0;  ///< viscous [N m s/rad or N s/m], dry [N m or N]
-  LinkJoint();  ///< limits start infinite
+  LinkJoint();                       ///< limits start infinite
 };
 
 /// Collects links, joints and shapes in any order, then checks them all and builds the tree.

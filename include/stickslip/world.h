@@ -38,7 +38,7 @@ struct StepSolverOptions {
   double relative_tolerance = 1e-8;  ///< kAuto: part of the largest contact speed [1]
   int max_sweeps = 100'000;          ///< kPerContact, kPgs
   double alpha = 1.0, alpha_min = 0.7,
-         gamma = 0.99;  ///< kPerContact, kPgs (alpha only); see SolveOptions
+         gamma = 0.99;     ///< kPerContact, kPgs (alpha only); see SolveOptions
   bool warm_start = true;  ///< start at the impulses of the last step
 };
 
@@ -59,7 +59,7 @@ struct RobotOptions {
   Vector3 position{0, 0, 0};  ///< of the base [m]; of a fixed base too
   std::array<double, 4> orientation{1, 0, 0,
                                     0};  ///< of the base, w x y z; normalized on the way in
-  std::string material = "default";  ///< of shapes that name none; see set_material_pair
+  std::string material = "default";      ///< of shapes that name none; see set_material_pair
 };
 
 /// Bits a step reports. Nothing is dropped silently.
@@ -88,11 +88,11 @@ struct Contact {
 /// What the last step did for one robot (its last substep, where there were several).
 struct StepInfo {
   StepStatus status = StepStatus::kOk;
-  int contacts = 0;  ///< candidates in the solve
+  int contacts = 0;      ///< candidates in the solve
   int sweeps = 0;        ///< passes over all contacts
   int newton_steps = 0;  ///< of the solver's finish and fallback; kAuto only
   int substeps = 1;      ///< kEnergySafe: parts the step was cut into
-  double residual = 0;  ///< largest contact residual [m/s]
+  double residual = 0;   ///< largest contact residual [m/s]
 };
 
 /// Seconds spent per stage since the last reset; only counted while `World::set_profiling(true)`.
@@ -107,9 +107,9 @@ struct StageTimes {
 
 class World;
 
-/// A robot in a world, made by `World::add_robot`. References stay valid as long as the world. Functions
-/// with an `out` throw ModelError where it has the wrong length; those that take a frame name throw
-/// ModelError that lists the names.
+/// A robot in a world, made by `World::add_robot`. References stay valid as long as the world.
+/// Functions with an `out` throw ModelError where it has the wrong length; those that take a frame
+/// name throw ModelError that lists the names.
 class Robot {
  public:
   ~Robot();
@@ -183,11 +183,12 @@ class World {
   /// A horizontal plane that fills everything below z = height [m]. Throws ModelError for
   /// a second one or a height that is not finite.
   void add_ground(double height = 0, const std::string& material = "default");
-  /// Adds a robot at its zero configuration (base as the options say), at rest. Throws ModelError for
-  /// a null model, a name that is taken or a pose that is not finite; the world is then as it was.
+  /// Adds a robot at its zero configuration (base as the options say), at rest. Throws ModelError
+  /// for a null model, a name that is taken or a pose that is not finite; the world is then as it
+  /// was.
   Robot& add_robot(ModelPtr model, const RobotOptions& options = {});
-  /// Sets how two materials meet, in either order, now and for what is added later. Throws ModelError
-  /// for values out of range.
+  /// Sets how two materials meet, in either order, now and for what is added later. Throws
+  /// ModelError for values out of range.
   void set_material_pair(const std::string& a, const std::string& b, const MaterialPair& pair);
 
   int num_robots() const;
