@@ -91,6 +91,7 @@ def markdown(data: dict) -> str:
         for e in result["engines"]:
             ours = e["engine"] != "mujoco"
             energy = f"{e['energy_settled_J']:.1f} → {e['energy_at_end_J']:.1f}" if e["energy_settled_J"] else ""
+            depth = f"{1e3 * e['mean_penetration_m']:.4f} / {1e3 * e['max_penetration_m']:.3f}" if e["contacts"] else ""
             cells = [
                 result["task"],
                 e["engine"] + (" **FAILED**: " + "; ".join(e["faults"]) if e["faults"] else ""),
@@ -99,7 +100,7 @@ def markdown(data: dict) -> str:
                 f"{e['target_ratio']:g}" if e["target_ratio"] else "",
                 f"{e['contacts']:.2f}",
                 f"{e['pushing_contacts']:.2f}",
-                f"{1e3 * e['mean_penetration_m']:.4f} / {1e3 * e['max_penetration_m']:.3f}",
+                depth,
                 energy,
                 f"{e['max_residual_m_per_s']:.1e} ({e['share_above_1e-8']:.0e})" if ours else "",
             ]
