@@ -67,7 +67,7 @@ struct SolveOptions {
   FrictionLaw law = FrictionLaw::kCoulomb;  ///< kPgs knows kCoulomb only
   double tolerance =
       1e-9;  ///< on the largest contact residual [m/s], or on the sum that `stop` names
-  int max_sweeps = 1000;  ///< >= 1; kAuto: an upper bound that it rarely meets
+  int max_sweeps = 1000;  ///< >= 1; kAuto: of each of its stages
   /// kPerContact only. kGoldenSection minimizes an energy, so it knows kMaxDissipation only.
   SingleContactMethod single_contact = SingleContactMethod::kHalley;
   double single_contact_tolerance =
@@ -78,7 +78,7 @@ struct SolveOptions {
   double gamma = 1.0;      ///< kPerContact: decay per sweep (0.99 in the paper); 1 keeps alpha
   StopTest stop =
       StopTest::kResidual;  ///< kPerContact and kPgs; the status looks at the residual in any case
-  bool record_history = false;  ///< fill SolveResult::history; costs an allocation per sweep
+  bool record_history = false;  ///< fill SolveResult::history
   void validate() const;        ///< throws ModelError that names the option
 };
 

@@ -170,24 +170,31 @@ void bind_model_class(nb::module_& m) {
                     "has the joints only.\n"
                     "Joints are in depth-first order, siblings by name. Joints that mimic another "
                     "are independent.")
-      .def_prop_ro("name", &Model::name)
+      .def_prop_ro("name", &Model::name, "As the description gives it.")
       .def_prop_ro(
           "base",
           [](const Model& self) { return self.base() == BaseType::kFixed ? "fixed" : "floating"; },
           "'floating' or 'fixed'")
       .def_prop_ro("bodies", &Model::bodies, "Body 0 is the base; body j + 1 hangs on joint j.")
-      .def_prop_ro("joints", &Model::joints)
-      .def_prop_ro("frames", &Model::frames)
-      .def_prop_ro("shapes", &Model::shapes)
+      .def_prop_ro("joints", &Model::joints,
+                   "Moving joints, depth first, siblings by name: the order of q and u.")
+      .def_prop_ro("frames", &Model::frames, "One per link of the description, merged ones too.")
+      .def_prop_ro("shapes", &Model::shapes, "Collision shapes, meshes too.")
       .def_prop_ro("warnings", &Model::warnings,
                    "What was accepted although it looks wrong, or read but not followed.")
-      .def_prop_ro("num_joints", &Model::num_joints)
+      .def_prop_ro("num_joints", &Model::num_joints, "Moving joints.")
       .def_prop_ro("nq", &Model::nq, "Length of the generalized position.")
       .def_prop_ro("nu", &Model::nu, "Length of the generalized velocity.")
       .def_prop_ro("mass", &Model::mass, "Of all bodies; of a fixed base, without body 0 [kg].")
-      .def_prop_ro("body_names", [](const Model& self) { return names(self.bodies()); })
-      .def_prop_ro("joint_names", [](const Model& self) { return names(self.joints()); })
-      .def_prop_ro("frame_names", [](const Model& self) { return names(self.frames()); })
+      .def_prop_ro(
+          "body_names", [](const Model& self) { return names(self.bodies()); },
+          "In the order of `bodies`.")
+      .def_prop_ro(
+          "joint_names", [](const Model& self) { return names(self.joints()); },
+          "In the order of q and u.")
+      .def_prop_ro(
+          "frame_names", [](const Model& self) { return names(self.frames()); },
+          "In the order of `frames`.")
       .def_prop_ro(
           "lower", [](const Model& self) { return joint_values(self, &Joint::lower); },
           nb::rv_policy::move, "(num_joints,) [rad or m]")

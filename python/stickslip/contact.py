@@ -60,6 +60,7 @@ class ContactProblem:
 
     @property
     def num_contacts(self) -> int:
+        """n, as many as `friction` has."""
         return len(self._friction)
 
     def _arrays(self) -> tuple[Array, Array, Array]:
@@ -77,9 +78,9 @@ class ContactSolution:
     velocity: Array  #: (3n,) G impulse + c [m/s]
     residual: float  #: largest contact residual [m/s]
     contact_residuals: Array  #: (n,) [m/s]
-    sweeps: int
-    newton_steps: int
-    status: Literal["converged", "not_converged", "infeasible"]
+    sweeps: int  #: passes over all contacts
+    newton_steps: int  #: of the finish and the fallback of method "auto"
+    status: Literal["converged", "not_converged", "infeasible"]  #: infeasible: a contact that cannot push is driven in
     history: Array  #: value of the stop test after each sweep (method "auto": residual after each stage), if asked for
 
     @property
@@ -108,6 +109,7 @@ def solve(
     method: "auto" (sweeps, Newton finish, fallback), "per_contact" ([Hwangbo 2018] Algorithm 2), "pgs" (eq. 17, 18).
     law: "coulomb" (eq. 6: friction opposes sliding) or "max_dissipation" (eq. 8; not with "pgs").
     tolerance: on the largest contact residual [m/s], or on what `stop` names.
+    max_sweeps: passes over all contacts; "auto": of each of its stages.
     impulse: (3n,) start [N s].
     single_contact: method of "per_contact" for one contact; "golden_section" knows "max_dissipation" only.
     alpha, alpha_min, gamma: relaxation of "per_contact", alpha <- alpha_min + gamma (alpha - alpha_min) per sweep (the paper:
@@ -115,6 +117,8 @@ def solve(
     stop: what ends the sweeps of "per_contact" and "pgs". The paper's are "violation_sum" and "update_sum".
     single_contact_tolerance: [N s]; 0: a tenth of what `tolerance` asks for.
     history: record the stop test after each sweep.
+
+    ValueError names the argument that is not usable.
     """
     p = _problem(problem)
     start = np.empty(0) if impulse is None else array("impulse", impulse, (3 * p.num_contacts,))
@@ -140,7 +144,7 @@ def solve(
 
 
 def residual(problem: ContactProblem, impulse: ArrayLike, law: Law = "coulomb") -> Array:
-    """(n,) [m/s]: how far each contact is from its law. A pure function; what `solve` and `World` certify with.
+    """(n,) [m/s]: how far each contact is from its law, for an impulse (3n,) [N s]. A pure function; `solve` and `World` certify with it.
 
     "coulomb": De Saxce's natural map. "max_dissipation": |G_ii (lambda_i - exact_i)| with the others held.
     """
@@ -156,7 +160,7 @@ def solve_contact(
     law: Law = "coulomb",
     tolerance: float = 1e-10,
 ) -> Array:
-    """(3,) [N s]: the impulse of a single contact, delassus (3, 3) [1/kg], free_velocity (3,) [m/s].
+    """(3,) [N s]: the impulse of a single contact, delassus (3, 3) [1/kg], free_velocity (3,) [m/s], friction >= 0.
 
     tolerance: "halley": residual velocity over |free_velocity|; the others: impulse interval [N s].
     Raises ArithmeticError where the method fails, which "halley" and "bisection" do not.

@@ -64,11 +64,11 @@ class Contact:
 class SolveInfo:
     """What the last step did: of one robot, or the sums and worst values over a world."""
 
-    status: StepStatus
+    status: StepStatus  #: bits
     contacts: int  #: candidates in the solve; a world: of all robots
-    sweeps: int  #: a world: the most of any robot, as are all below
-    newton_steps: int
-    substeps: int
+    sweeps: int  #: passes over all contacts; a world: the most of any robot, as are all below
+    newton_steps: int  #: of the solver's finish and fallback
+    substeps: int  #: parts the step was cut into ("energy_safe")
     residual: float  #: largest contact residual [m/s]
 
 
@@ -81,7 +81,7 @@ class StageTimes:
     delassus: float  #: rows of the contact problem [s]
     solve: float  #: contact impulses [s]
     integrate: float  #: final velocity, drift, position correction [s]
-    steps: int
+    steps: int  #: time steps counted
 
 
 def _read_only(values: Array) -> Array:
@@ -235,12 +235,12 @@ class Robot:
 
     @property
     def kinetic_energy(self) -> float:
-        """[J]"""
+        """Of the velocity `u` [J]."""
         return self._core.kinetic_energy
 
     @property
     def potential_energy(self) -> float:
-        """[J], zero at the world's origin."""
+        """Of all bodies in the world's gravity [J], zero at the world's origin."""
         return self._core.potential_energy
 
     @property
@@ -352,7 +352,7 @@ class World:
     # Building
 
     def add_ground(self, height: float = 0.0, material: str = "default") -> None:
-        """A horizontal plane that fills everything below z = height [m]; one per world."""
+        """A horizontal plane that fills everything below z = height [m]. ValueError for a second one."""
         self._core.add_ground(number("height", height), material)
 
     def add_robot(
@@ -407,17 +407,17 @@ class World:
 
     @property
     def time(self) -> float:
-        """[s]"""
+        """Since the world was made [s]."""
         return self._core.time
 
     @property
     def time_step(self) -> float:
-        """[s]"""
+        """Length of a step [s]."""
         return self._core.time_step
 
     @property
     def gravity(self) -> Array:
-        """(3,) [m/s^2]"""
+        """(3,) acceleration by gravity, world axes [m/s^2]."""
         return self._core.gravity
 
     @property
