@@ -1,4 +1,4 @@
-// Contact against closed forms, computed with the step's own discretisation: what is left is
+// Contact against closed forms, computed with the step's own discretization: what is left is
 // rounding. Inclines are a level ground under tilted gravity.
 //
 // Both integrators push with m g h per step; the energy-safe one only with m g h / 2 in the first,
