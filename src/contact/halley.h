@@ -109,8 +109,8 @@ STICKSLIP_INLINE void slip_bracket(const LocalContact<S>& k, const Reduced<S>& r
                                    const SlipQuartic<S>& q, S norm, Mask<S> slip, S& lo, S& hi) {
   const S zero = constant<S>(0), one = constant<S>(1);
   if constexpr (kMaxDissipation) {
-    // The arc that the stick impulse sees: cos(angle) >= visible (solvers: convex problem,
-    // homogeneous cone).
+    // The arc that the stick impulse sees: cos(angle) >= visible (the cone is
+    // homogeneous).
     const S visible = k.mu * r.z / norm;
     const S up = max(one - visible, zero), down = one + visible;
     const auto partial = down > constant<S>(sizeof(Value<S>) == 4 ? 1e-15 : 1e-30);
@@ -200,6 +200,14 @@ STICKSLIP_INLINE void solve_slip(const LocalContact<S>& k, const Reduced<S>& r, 
   for (int i = 0; i < 3; ++i) lambda[i] = select(r.slip, slip[i], lambda[i]);
 }
 
+/// The same out of line, for callers that seldom need it.
+template <bool kMaxDissipation, class S>
+__attribute__((noinline)) void solve_slip_rarely(const LocalContact<S>& k, const Reduced<S>& r,
+                                                 S speed, S lambda[3]) {
+  int evaluations;
+  solve_slip<kMaxDissipation>(k, r, speed, lambda, evaluations);
+}
+
 /// One contact: the impulse lambda [N s] for the velocity c [m/s] that it has without it.
 /// `tolerance`: residual velocity relative to |c|. `evaluations` counts those of the quartic (the
 /// slowest lane's), 0 when no lane slips.
@@ -247,8 +255,7 @@ STICKSLIP_INLINE void visit_slip(const LocalContact<S>& k, const Reduced<S>& r, 
   Reduced<S> rest = r;
   rest.slip = r.slip & !good;
   if (any(rest.slip)) {
-    int evaluations;
-    solve_slip<kMaxDissipation>(k, rest, speed, lambda, evaluations);
+    solve_slip_rarely<kMaxDissipation>(k, rest, speed, lambda);
     const S n = sqrt(madd(lambda[0], lambda[0], lambda[1] * lambda[1])),
             on = one / select(n > zero, n, one);
     dx = select(rest.slip, lambda[0] * on, dx);

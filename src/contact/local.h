@@ -80,8 +80,7 @@ STICKSLIP_INLINE Reduced<S> reduce(const LocalContact<S>& k, S cx, S cy, S cz) {
   r.z = nmadd(k.wx, r.x, nmadd(k.wy, r.y, r.a));
   const S limit = k.mu * r.z;
   const auto closing = (cz < zero) & (k.inv_zz > zero);
-  // lambda_z >= 0 has to be tested apart: with mu |z| alone a pulling impulse passes (solvers.md 2.5,
-  // 9).
+  // lambda_z >= 0 has to be tested apart: with mu |z| alone a pulling impulse passes.
   const auto inside = (r.z >= zero) & (madd(r.x, r.x, r.y * r.y) <= limit * limit);
   r.stick = closing & inside;
   r.slip = closing & !inside;

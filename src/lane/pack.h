@@ -126,6 +126,32 @@ STICKSLIP_INLINE bool any(PackMask<float, 8> m) {
 #if defined(__AVX512F__)
 STICKSLIP_PACK_OPS(double, 8, _mm512_fmadd_pd(a.v, b.v, c.v), _mm512_sqrt_pd(a.v))
 STICKSLIP_PACK_OPS(float, 16, _mm512_fmadd_ps(a.v, b.v, c.v), _mm512_sqrt_ps(a.v))
+#else
+// Twice as wide as the register: two halves.
+#define STICKSLIP_PACK_HALVES(T, W)                                            \
+  STICKSLIP_INLINE Pack<T, W> madd(Pack<T, W> a, Pack<T, W> b, Pack<T, W> c) { \
+    Pack<T, W / 2> x[2], y[2], z[2];                                           \
+    __builtin_memcpy(x, &a, sizeof a), __builtin_memcpy(y, &b, sizeof b);      \
+    __builtin_memcpy(z, &c, sizeof c);                                         \
+    for (int i = 0; i < 2; ++i) z[i] = madd(x[i], y[i], z[i]);                 \
+    __builtin_memcpy(&c, z, sizeof c);                                         \
+    return c;                                                                  \
+  }                                                                            \
+  STICKSLIP_INLINE Pack<T, W> sqrt(Pack<T, W> a) {                             \
+    Pack<T, W / 2> x[2];                                                       \
+    __builtin_memcpy(x, &a, sizeof a);                                         \
+    for (int i = 0; i < 2; ++i) x[i] = sqrt(x[i]);                             \
+    __builtin_memcpy(&a, x, sizeof a);                                         \
+    return a;                                                                  \
+  }                                                                            \
+  STICKSLIP_INLINE bool any(PackMask<T, W> m) {                                \
+    PackMask<T, W / 2> x[2];                                                   \
+    __builtin_memcpy(x, &m, sizeof m);                                         \
+    return any(x[0] | x[1]);                                                   \
+  }
+STICKSLIP_PACK_HALVES(double, 8)
+STICKSLIP_PACK_HALVES(float, 16)
+#undef STICKSLIP_PACK_HALVES
 #endif
 #elif defined(__ARM_NEON)
 STICKSLIP_PACK_OPS(double, 2, vfmaq_f64(c.v, a.v, b.v), vsqrtq_f64(a.v))
