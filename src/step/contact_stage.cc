@@ -7,6 +7,7 @@
 
 #include "contact/per_contact.h"
 #include "contact/pgs.h"
+#include "contact/write_out.h"
 
 namespace stickslip::step {
 namespace {
@@ -16,7 +17,6 @@ using dynamics::kMaxLanes;
 using dynamics::LinkIndex;
 using dynamics::Tree;
 
-constexpr int kCorrectionSweeps = 50;
 constexpr double kReach = 2e-3;  // candidates this near take part whatever their speed [m]
 
 int flat(LinkIndex link) { return link.slot * kMaxLanes + link.lane; }
@@ -48,12 +48,7 @@ ContactStage::ContactStage(const Model& model, const dynamics::TreeLayout& layou
       shared_(layout.num_joints),
       index_(num_dofs_),
       memory_(nullptr, free_block),
-      moved_(num_points_),
-      gaps_(num_points_ + 3),
-      displacement_(num_dofs_),
-      normal_(static_cast<size_t>(num_points_ + 3) * num_dofs_),
-      gram_(static_cast<size_t>(num_points_ + 3) * num_points_),
-      pushes_(num_points_ + 3) {
+      overlap_(num_points_, num_dofs_) {
   const contact::FactoredCapacity capacity{std::max(num_points_, 1), num_dofs_};
   memory_.reset(aligned_block(contact::FactoredProblem<double>::required_bytes(capacity)));
   problem_.attach(memory_.get(), capacity);
@@ -282,50 +277,7 @@ double ContactStage::work() const {
   return sum;
 }
 
-// ---- the same problem written out
-
-void ContactStage::write_out(double* g, double* c, double* mu, double* lambda) const {
-  const int n = count_, m = 3 * n;
-  for (int i = 0; i < n; ++i) {
-    const contact::FactoredContact<double>& a = problem_.contact(i);
-    const int na = problem_.six() ? 6 : a.count;
-    const auto dof = [&](const contact::FactoredContact<double>& k, int j) {
-      return problem_.six() ? j : k.index[j];
-    };
-    for (int j = 0; j <= i; ++j) {
-      const contact::FactoredContact<double>& b = problem_.contact(j);
-      const int nb = problem_.six() ? 6 : b.count;
-      Row3<double> block[3];  // columns of G_ij: rows of a, one per row of b
-      for (auto& column : block) column = make_row3(0.0, 0.0, 0.0);
-      for (int ka = 0, kb = 0; ka < na && kb < nb;) {
-        if (dof(a, ka) != dof(b, kb)) {
-          dof(a, ka) < dof(b, kb) ? ++ka : ++kb;
-          continue;
-        }
-        double row[3];
-        store(b.y[kb++], row);
-        for (int r = 0; r < 3; ++r) block[r] = madd(a.y[ka], row[r], block[r]);
-        ++ka;
-      }
-      double entries[3][3];
-      for (int r = 0; r < 3; ++r) store(block[r], entries[r]);
-      if (i == j) {
-        const double* p = a.private_block;
-        const double full[3][3] = {{p[0], p[1], p[2]}, {p[1], p[3], p[4]}, {p[2], p[4], p[5]}};
-        for (int r = 0; r < 3; ++r)
-          for (int s = 0; s < 3; ++s) entries[r][s] += full[r][s];
-      }
-      for (int r = 0; r < 3; ++r)
-        for (int s = 0; s < 3; ++s)
-          g[(3 * i + s) * m + 3 * j + r] = g[(3 * j + r) * m + 3 * i + s] = entries[r][s];
-    }
-    Row3<double> free = make_row3(a.offset[0], a.offset[1], a.offset[2]);
-    for (int k = 0; k < na; ++k) free = madd(a.y[k], problem_.w0[dof(a, k)], free);
-    store(free, c + 3 * i);
-    mu[i] = a.friction;
-    for (int r = 0; r < 3; ++r) lambda[3 * i + r] = a.impulse[r];
-  }
-}
+// ---- the same problem, dense
 
 ContactProblem ContactStage::explicit_problem() const {
   ContactProblem p;
@@ -334,14 +286,15 @@ ContactProblem ContactStage::explicit_problem() const {
   p.free_velocity.resize(3 * n);
   p.friction.resize(n);
   std::vector<double> lambda(3 * n);
-  write_out(p.delassus.data(), p.free_velocity.data(), p.friction.data(), lambda.data());
+  contact::write_out(problem_, p.delassus.data(), p.free_velocity.data(), p.friction.data(),
+                     lambda.data());
   return p;
 }
 
 void ContactStage::solve_explicit(const StepSolverOptions& options, StepInfo& info) {
   const size_t n = count_;
   double *g = dense_.data(), *c = g + 9 * n * n, *mu = c + 3 * n, *lambda = mu + n;
-  write_out(g, c, mu, lambda);
+  contact::write_out(problem_, g, c, mu, lambda);
   contact::ExplicitProblem p{count_, g, c, mu, lambda, nullptr, nullptr};
   p.attach(lambda + 3 * n);
   contact::prepare(p);
@@ -360,80 +313,18 @@ void ContactStage::solve_explicit(const StepSolverOptions& options, StepInfo& in
   info.newton_steps = 0;
   info.residual = contact::largest_residual(p, o.max_dissipation);
   if (!found.converged) info.status = StepStatus::kNotConverged;
-  for (int k = 0; k < problem_.dofs(); ++k) problem_.w[k] = problem_.w0[k];
-  for (int i = 0; i < count_; ++i) {
-    contact::FactoredContact<double>& a = problem_.contact(i);
-    for (int r = 0; r < 3; ++r) a.impulse[r] = lambda[3 * i + r], a.velocity[r] = p.v[3 * i + r];
-    const bool six = problem_.six();
-    for (int k = 0; k < (six ? 6 : a.count); ++k) {
-      double y[3], &w = problem_.w[six ? k : a.index[k]];
-      store(a.y[k], y);
-      for (int r = 0; r < 3; ++r) w = madd(y[r], a.impulse[r], w);
-    }
-  }
+  contact::read_back(problem_, lambda, p.v);
 }
 
-// ---- overlap
-
 bool ContactStage::correct_overlap(Tree<double>& tree, double clearance, double tolerance) {
-  bool overlap = false;
+  overlap_.clear();
   for (int i = 0; i < count_; ++i) {
-    ActiveContact& a = active_[i];
-    placed_[a.shape] = collide::place(tree, shapes_[a.shape]);
-    moved_[i] = collide::support_point(shapes_[a.shape], placed_[a.shape], a.point);
-    gaps_[i] = moved_[i].z + clearance;
-    overlap = overlap || gaps_[i] < -tolerance;
+    const int s = active_[i].shape;
+    if (i == 0 || s != active_[i - 1].shape) placed_[s] = collide::place(tree, shapes_[s]);
+    const Vec3<double> p = collide::support_point(shapes_[s], placed_[s], active_[i].point);
+    overlap_.add(shapes_[s].link, p, p.z + clearance);
   }
-  if (!overlap) return false;
-  // Normal rows, dof by dof: entry (k, i) at k * stride + i, so that everything below runs over
-  // contacts.
-  const int m = num_dofs_, stride = (count_ + 3) / 4 * 4;
-  double *z = normal_.data(), *x = pushes_.data(), *r = gaps_.data(), *gram = gram_.data();
-  std::fill(z, z + static_cast<size_t>(m) * stride, 0.0);
-  for (int i = 0; i < count_; ++i) {
-    double base[6];
-    dynamics::compute_row(tree, shapes_[active_[i].shape].link, moved_[i], {0.0, 0.0, 1.0}, base,
-                          [&](LinkIndex link, double entry) {
-                            z[(6 + tree.slots[link.slot].joint[link.lane]) * stride + i] = entry;
-                          });
-    if (floating_)
-      for (int k = 0; k < 6; ++k) z[k * stride + i] = base[k];
-  }
-  for (int j = 0; j < count_; ++j) {  // columns of Z Z^T
-    double* column = gram + static_cast<size_t>(j) * stride;
-    std::fill(column, column + stride, 0.0);
-    for (int k = 0; k < m; ++k) {
-      const double* row = z + static_cast<size_t>(k) * stride;
-      if (row[j] == 0) continue;
-      for (int i = 0; i < stride; ++i) column[i] = madd(row[i], row[j], column[i]);
-    }
-  }
-  // Projected Gauss-Seidel; r = gap + Z Z^T x is kept.
-  std::fill(x, x + count_, 0.0);
-  for (int i = count_; i < stride; ++i) r[i] = 0;
-  for (int sweep = 0; sweep < kCorrectionSweeps; ++sweep) {
-    double change = 0;
-    for (int i = 0; i < count_; ++i) {
-      const double* column = gram + static_cast<size_t>(i) * stride;
-      if (!(column[i] > 0)) continue;
-      const double next = std::max(0.0, x[i] - r[i] / column[i]), step = next - x[i];
-      x[i] = next;
-      for (int j = 0; j < stride; ++j) r[j] = madd(column[j], step, r[j]);
-      change = std::max(change, std::fabs(step) * column[i]);
-    }
-    if (change < 0.1 * tolerance) break;
-  }
-  std::vector<double>& d = displacement_;
-  for (int k = 0; k < m; ++k) {
-    d[k] = 0;
-    for (int i = 0; i < count_; ++i)
-      d[k] = madd(z[static_cast<size_t>(k) * stride + i], x[i], d[k]);
-  }
-  for (int k = 0; k < 6; ++k) tree.base.x[k] = d[k];
-  for (int slot = 0; slot < tree.num_slots; ++slot)
-    for (int lane = 0; lane < kMaxLanes; ++lane)
-      set_lane(tree.links[slot].x, lane, d[6 + tree.slots[slot].joint[lane]]);
-  return true;
+  return overlap_.run(tree, tolerance);
 }
 
 }  // namespace stickslip::step

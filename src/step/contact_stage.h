@@ -11,6 +11,7 @@
 #include "contact/factored.h"
 #include "dynamics/contact_rows.h"
 #include "dynamics/tree_memory.h"
+#include "step/overlap_correction.h"
 
 namespace stickslip::step {
 
@@ -78,16 +79,14 @@ class ContactStage {
   /// The problem written out, dense.
   ContactProblem explicit_problem() const;
 
-  /// Moves overlapping points of the solve to the surface: delta = L^-1 Z^T x with 0 <= x, gap + Z
-  /// Z^T x >= 0, normal rows Z at the tree's present positions and the factor as it is. Leaves
-  /// delta in L-space (the tree's x); false if nothing to do.
+  /// Displacement that moves overlapping points of the solve to the surface, at the tree's present
+  /// positions, into the tree's x; false if there is nothing to do.
   bool correct_overlap(dynamics::Tree<double>& tree, double clearance, double tolerance);
 
  private:
   void add(int shape, int point, const Vec3<double>& position, double gap);
   /// Takes the points lower than `reach` above the ground.
   void detect_within(const dynamics::Tree<double>& tree, double clearance, double reach);
-  void write_out(double* g, double* c, double* mu, double* lambda) const;
   void solve_explicit(const StepSolverOptions& options, StepInfo& info);
 
   std::vector<collide::GroundShape> shapes_;
@@ -105,8 +104,8 @@ class ContactStage {
   std::vector<int> index_;
   std::unique_ptr<char, void (*)(char*)> memory_;
   contact::FactoredProblem<double> problem_;
-  std::vector<Vec3<double>> moved_;  // active points at the new configuration
-  std::vector<double> dense_, gaps_, displacement_, normal_, gram_, pushes_;
+  OverlapCorrection overlap_;
+  std::vector<double> dense_;
 };
 
 }  // namespace stickslip::step
