@@ -37,9 +37,23 @@ void single_contact(const ProblemSample& sample, int i, double block[9], double 
   }
 }
 
+/// Keeps contact i if it slides with the others' impulses held.
+void keep_if_sliding(const ProblemSample& sample, int i, SlipSamples& out) {
+  double block[9], velocity[3];
+  single_contact(sample, i, block, velocity);
+  const double mu = sample.problem.friction[i];
+  ++out.contacts;
+  const SingleContactResult solved =
+      solve_contact(block, velocity, mu, {.law = FrictionLaw::kMaxDissipation});
+  if (solved.evaluations == 0) return;  // open or sticking
+  out.delassus.insert(out.delassus.end(), block, block + 9);
+  out.free_velocity.insert(out.free_velocity.end(), velocity, velocity + 3);
+  out.friction.push_back(mu);
+}
+
 }  // namespace
 
-StepRecord record_step(Task& task, World& world, Robot& robot) {
+StepRecord Recorder::step(Task& task, World& world, Robot& robot) {
   StepRecord r;
   r.episode_over = step_and_look(task, world, robot, [&] {
     const StepInfo& info = robot.info();
@@ -49,36 +63,44 @@ StepRecord record_step(Task& task, World& world, Robot& robot) {
     r.residual = info.residual;
     r.converged = info.status == StepStatus::kOk;
     r.penetration = mean_foot_penetration(robot);
-    const ContactProblem problem = world.last_contact_problem(0);
-    for (int i = 0; i < problem.num_contacts(); ++i)
-      r.approach = std::max(r.approach, -problem.free_velocity[3 * i + 2]);
+    r.impact = impact(world, robot);
   });
+  if (r.episode_over) pushed_.clear();
   return r;
+}
+
+bool Recorder::impact(const World& world, const Robot& robot) {
+  constexpr double kImpactSpeed = 0.1;  // [m/s]
+  const std::span<const Contact> contacts = robot.contacts();
+  bool found = false;
+  std::vector<std::pair<int, int>> now;
+  for (const Contact& c : contacts)
+    if (c.impulse[2] > 0) now.emplace_back(c.shape, c.point);
+  if (std::any_of(now.begin(), now.end(), [&](const auto& point) {
+        return std::find(pushed_.begin(), pushed_.end(), point) == pushed_.end();
+      })) {
+    const ContactProblem problem = world.last_contact_problem(0);
+    for (std::size_t i = 0; i < contacts.size(); ++i)
+      found = found ||
+              (contacts[i].impulse[2] > 0 && -problem.free_velocity[3 * i + 2] > kImpactSpeed &&
+               std::find(pushed_.begin(), pushed_.end(),
+                         std::pair{contacts[i].shape, contacts[i].point}) == pushed_.end());
+  }
+  pushed_ = std::move(now);
+  return found;
 }
 
 void sample_slipping(Task& task, World& world, Robot& robot, long wanted, long max_steps,
                      SlipSamples& out) {
   ProblemSample sample;
-  const auto take = [&] {
+  const auto full = [&] { return static_cast<long>(out.friction.size()) >= wanted; };
+  const auto look = [&] {
     sample.problem = world.last_contact_problem(0, &sample.impulse);
-    for (int i = 0; i < sample.problem.num_contacts(); ++i) {
-      if (static_cast<long>(out.friction.size()) >= wanted) return;
-      ++out.contacts;
-      double block[9], velocity[3];
-      single_contact(sample, i, block, velocity);
-      // Only a sliding contact is worth an evaluation; open and sticking ones are told apart first.
-      const double mu = sample.problem.friction[i];
-      if (solve_contact(block, velocity, mu, {.law = FrictionLaw::kMaxDissipation}).evaluations ==
-          0)
-        continue;
-      out.delassus.insert(out.delassus.end(), block, block + 9);
-      out.free_velocity.insert(out.free_velocity.end(), velocity, velocity + 3);
-      out.friction.push_back(mu);
-    }
+    for (int i = 0; i < sample.problem.num_contacts() && !full(); ++i)
+      keep_if_sliding(sample, i, out);
   };
-  for (long end = out.steps + max_steps;
-       out.steps < end && static_cast<long>(out.friction.size()) < wanted; ++out.steps)
-    step_and_look(task, world, robot, take);
+  for (long end = out.steps + max_steps; out.steps < end && !full(); ++out.steps)
+    step_and_look(task, world, robot, look);
 }
 
 void sample_problems(Task& task, World& world, Robot& robot, long steps, int stride,

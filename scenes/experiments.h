@@ -3,6 +3,7 @@
 #pragma once
 #include <stickslip/world.h>
 
+#include <utility>
 #include <vector>
 
 #include "scenes/tasks.h"
@@ -13,10 +14,20 @@ namespace stickslip::scenes {
 struct StepRecord {
   int contacts = 0, sweeps = 0, newton_steps = 0;
   double residual = 0;     ///< [m/s]
-  double approach = 0;     ///< fastest approach of a contact, were there no impulses [m/s]
   double penetration = 0;  ///< of the four feet, mean; negative above the ground [m]
+  bool impact = false;     ///< a point pushed that did not before and came in faster than 0.1 m/s
   bool converged = true;   ///< the solve reached its tolerance
   bool episode_over = false;
+};
+
+/// Takes steps and says what each did. The world holds this robot only, as in all below.
+class Recorder {
+ public:
+  StepRecord step(Task& task, World& world, Robot& robot);
+
+ private:
+  bool impact(const World& world, const Robot& robot);
+  std::vector<std::pair<int, int>> pushed_;  // shape and point, in the step before
 };
 
 /// Sliding contacts, each as a problem of its own: the other contacts' impulses belong to the free
@@ -34,10 +45,8 @@ struct ProblemSample {
   std::vector<double> impulse;  ///< (3n) [N s]
 };
 
-/// Takes one step and says what it did. The world holds this robot only, as in all below.
-StepRecord record_step(Task& task, World& world, Robot& robot);
-
-/// Steps until `wanted` sliding contacts were added to `out`, at most `max_steps` steps.
+/// Steps until `wanted` contacts that slide, once the problem is solved, are in `out`; at most
+/// `max_steps` steps.
 void sample_slipping(Task& task, World& world, Robot& robot, long wanted, long max_steps,
                      SlipSamples& out);
 

@@ -73,16 +73,17 @@ void repeat(long times, Step&& step) {
   }
 }
 
-/// (steps, 8): contacts, sweeps, Newton steps, residual, approach, penetration, converged, episode
+/// (steps, 8): contacts, sweeps, Newton steps, residual, penetration, impact, converged, episode
 /// over; see StepRecord.
 ArrayOut record(Task& task, World& world, Robot& robot, long steps) {
+  scenes::Recorder recorder;
   std::vector<double> rows;
   rows.reserve(8 * steps);
   repeat(steps, [&] {
-    const scenes::StepRecord r = scenes::record_step(task, world, robot);
+    const scenes::StepRecord r = recorder.step(task, world, robot);
     rows.insert(rows.end(),
                 {double(r.contacts), double(r.sweeps), double(r.newton_steps), r.residual,
-                 r.approach, r.penetration, double(r.converged), double(r.episode_over)});
+                 r.penetration, double(r.impact), double(r.converged), double(r.episode_over)});
   });
   return make_array({static_cast<std::size_t>(steps), 8},
                     [&](std::span<double> to) { std::copy(rows.begin(), rows.end(), to.begin()); });

@@ -8,7 +8,7 @@ from stickslip.paper import figures
 from stickslip.paper.methods import METHODS, scene_of
 from stickslip.paper.page import figure, html_table, paragraph
 from stickslip.paper.settings import Settings
-from stickslip.paper.words import listed, number, percent
+from stickslip.paper.words import listed, millimetres, number, percent
 
 TITLE = "At 50 Hz"
 INTEGRATORS = {"semi_implicit": "Semi-implicit (the paper's)", "energy_safe": "Energy-safe (ours, default)"}
@@ -87,8 +87,15 @@ def draw(data: dict, folder) -> list:
             rows = data["cases"][task][integrator]
             values = [(r[key] or 0.0) * scale if scale else 100 * r[key] / r["episodes"] for r in rows]
             color = METHODS["bisection" if integrator == "semi_implicit" else integrator].color
-            axis.plot(milliseconds, [max(v, 1e-13) for v in values] if logarithmic else values, "o-", color=color, label=label, ms=5)
-        axis.set_title(title, fontsize=9.5)
+            axis.plot(
+                milliseconds,
+                [max(v, 1e-13) for v in values] if logarithmic else values,
+                "o-",
+                color=color,
+                label=label,
+                ms=5,
+            )
+        figures.title(axis, title, size=9.5)
         axis.set_xlabel("time step [ms]")
         axis.set_xticks(milliseconds)
         if logarithmic:
@@ -107,13 +114,15 @@ def section(data: dict) -> str:
         for integrator, label in INTEGRATORS.items():
             found = data["cases"][task][integrator]
             for what, values in (
-                ("mean penetration, mm", [_mm(r["mean_penetration"]) for r in found]),
-                ("largest penetration, mm", [_mm(r["max_penetration"]) for r in found]),
-                ("energy gained at most, J", [number(r["energy_growth"], 2) for r in found]),
+                ("penetration, mean, mm", [millimetres(r["mean_penetration"]) for r in found]),
+                ("and largest, landing too, mm", [millimetres(r["max_penetration"]) for r in found]),
+                ("energy gained at most, J", [_joule(r["energy_growth"]) for r in found]),
                 ("exploded", [f"{r['exploded']} of {r['episodes']}" for r in found]),
                 ("time per step, µs", [number(r["us_per_step"], 2) for r in found]),
             ):
-                rows.append([f"{name}, {label.split(' (')[0].lower()}" if what.startswith("mean") else "", what, *values])
+                rows.append(
+                    [f"{name}, {label.split(' (')[0].lower()}" if what.startswith("penetration") else "", what, *values]
+                )
     return (
         figure("fifty_hertz.png", "The same tasks with steps of 1 to 20 ms.")
         + html_table(["", "", *steps], rows, rules_before=tuple(range(5, 20, 5)), text_columns=2)
@@ -121,8 +130,8 @@ def section(data: dict) -> str:
     )
 
 
-def _mm(metres: float | None) -> str:
-    return "–" if metres is None else number(1e3 * metres, 2)
+def _joule(energy: float) -> str:
+    return "&lt; 10<sup>−9</sup>" if energy < 1e-9 else number(energy, 2)
 
 
 def _sentence(data: dict) -> str:
@@ -135,7 +144,7 @@ def _sentence(data: dict) -> str:
     text = (
         'The paper: stable "at 50 Hz due to its strict adherence to the dynamical principles", for unactuated tasks. '
         f"With its step of {dt}, {percent(plain['exploded'] / plain['episodes'])} of our {plain['episodes']} drops explode (a velocity above 1000), "
-        f"and hanging feet sink by {_mm(sunk['mean_penetration'])} mm. "
+        f"and hanging feet sink by {millimetres(sunk['mean_penetration'])} mm. "
     )
     if plain["exploded"]:
         text += (
@@ -150,7 +159,7 @@ def _sentence(data: dict) -> str:
     ]
     text += (
         f"The energy-safe step: {listed(explosions) + ' exploded' if explosions else 'no explosion at any step size'}, "
-        f"{_mm(held['mean_penetration'])} mm in hang and at most {number(max(ours['energy_growth'], held['energy_growth']), 2)} J gained at {dt}. "
+        f"{millimetres(held['mean_penetration'])} mm in hang and at most {number(max(ours['energy_growth'], held['energy_growth']), 2)} J gained at {dt}. "
         f"It cuts a step where bodies turn fast, so it costs {number(ours['us_per_step'], 2)} µs there against {number(plain['us_per_step'], 2)} µs. "
         "Energy gained is the largest rise above the lowest energy so far in an episode that did not explode; the robot is not driven, so any rise is an error."
     )

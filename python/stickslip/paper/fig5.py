@@ -8,7 +8,7 @@ from stickslip.paper import figures
 from stickslip.paper.methods import METHODS, TASKS, advance, scene_of
 from stickslip.paper.page import figure, paragraph
 from stickslip.paper.settings import Settings
-from stickslip.paper.words import listed, number, percent, spread
+from stickslip.paper.words import count, listed, number, percent, spread
 
 TITLE = "Fig. 5: cost per stage"
 STAGES = {
@@ -32,15 +32,16 @@ def measure(settings: Settings, tick) -> dict:
         for method in METHODS:
             scene = scene_of(task, method)
             world = scene.world
-            advance(scene, min(1000, settings.profiled_steps))  # caches, branch prediction
-            scene.reset(0)
             world.set_profiling(True)
-            world.reset_stage_times()
-            advance(scene, settings.profiled_steps)
-            spent = world.stage_times
-            tasks.setdefault(task, {})[method] = {
-                stage: getattr(spent, stage) / max(spent.steps, 1) * 1e6 for stage in STAGES
-            }
+            rounds = []
+            for _ in range(settings.timed_rounds):
+                scene.reset(0)
+                world.reset_stage_times()
+                advance(scene, settings.profiled_steps)
+                spent = world.stage_times
+                rounds.append({stage: getattr(spent, stage) / max(spent.steps, 1) * 1e6 for stage in STAGES})
+            # by the wall clock, so the round that was disturbed least
+            tasks.setdefault(task, {})[method] = min(rounds, key=lambda r: sum(r.values()))
             tick(1)
     return {"steps": settings.profiled_steps, "tasks": tasks}
 
@@ -56,9 +57,14 @@ def draw(data: dict, folder) -> list:
             bottom += values
         for k, total in enumerate(bottom):
             axis.text(k, total, f"{total:.1f}", ha="center", va="bottom", fontsize=8, color=figures.INK)
-        axis.set_title(name)
+        figures.title(axis, name)
         axis.set_xticks(
-            range(len(METHODS)), [m.label for m in METHODS.values()], rotation=55, ha="right", rotation_mode="anchor", fontsize=8
+            range(len(METHODS)),
+            [m.short for m in METHODS.values()],
+            rotation=55,
+            ha="right",
+            rotation_mode="anchor",
+            fontsize=8,
         )
         axis.margins(y=0.08)
     axes[0].set_ylabel("time per step [µs]")
@@ -78,12 +84,12 @@ def section(data: dict) -> str:
     text = (
         "In the paper the Delassus matrix costs as much as the contact solve. Here it is never formed: the rows "
         f"<i>Y</i> = <i>J L</i><sup>−1</sup> cost {spread(delassus)} times the solve by bisection (which does write the matrix out, within its solve). "
-        f"PGS spends {listed([f'{number(v, 2)} in {TASKS[t].lower()}' for t, v in zip(TASKS, solves, strict=True)])} times "
-        "the solve time of bisection. Of our default step, dynamics take "
+        f"For the solve alone PGS takes {listed([f'{number(v, 2)} times in {TASKS[t].lower()}' for t, v in zip(TASKS, solves, strict=True)])} "
+        "the time of bisection. Of our default step, dynamics take "
         f"{percent(min(share('energy_safe', 'dynamics')))} to {percent(max(share('energy_safe', 'dynamics')))}, the solve "
-        f"{percent(min(share('energy_safe', 'solve')))} to {percent(max(share('energy_safe', 'solve')))}, and the drift with its projection counts as integration. "
+        f"{percent(min(share('energy_safe', 'solve')))} to {percent(max(share('energy_safe', 'solve')))}, and integration most of the rest: it holds the drift with its projection and, at the new configuration, the kinematics and the factor that the next step takes over. "
         "Reading the clock five times per step is part of these numbers."
     )
     return figure(
-        "fig5_stages.png", f"<b>Fig. 5.</b> Time per step by stage, over {number(data['steps'], 6)} steps per bar."
+        "fig5_stages.png", f"<b>Fig. 5.</b> Time per step by stage, over {count(data['steps'])} steps per bar."
     ) + paragraph(text)

@@ -8,7 +8,7 @@ from stickslip.paper import figures
 from stickslip.paper.methods import METHODS, record, scene_of
 from stickslip.paper.page import figure, html_table, paragraph
 from stickslip.paper.settings import Settings
-from stickslip.paper.words import listed, number
+from stickslip.paper.words import listed, millimetres, number
 
 TITLE = "Fig. 7: penetration while hanging"
 CASES = {
@@ -19,6 +19,7 @@ CASES = {
 }
 _FALL = 2.0  # the robot is on its feet after it [s]
 _POINTS = 400
+_FLOOR = 1e-7  # of the logarithmic panel [mm]
 
 
 def work(settings: Settings) -> int:
@@ -51,13 +52,20 @@ def draw(data: dict, folder) -> list:
     fig, axes = figures.new(2, 1, height=5.0, sharex=True, height_ratios=(1.25, 1))
     for axis in axes:
         for key, (_, label, color, _) in CASES.items():
-            values = np.array(data["cases"][key]["penetration_mm"])
+            values = np.maximum(data["cases"][key]["penetration_mm"], _FLOOR)
             t = (np.arange(len(values)) + 0.5) / len(values) * data["seconds"]
-            axis.plot(t, values, color=color, label=label, lw=2.2 if key == "energy_safe" else 1.6)
+            axis.plot(
+                t,
+                values,
+                color=color,
+                label=label,
+                lw=2.2 if key == "energy_safe" else 1.6,
+                clip_on=key != "energy_safe",
+            )
     axes[0].set_ylabel("penetration [mm]")
     axes[0].set_ylim(bottom=0)
     axes[1].set_yscale("log")
-    axes[1].set_ylim(bottom=1e-7)
+    axes[1].set_ylim(bottom=_FLOOR)
     axes[1].set_ylabel("the same, logarithmic")
     axes[1].set_xlabel("time [s]")
     axes[1].set_xlim(0, data["seconds"])
@@ -69,7 +77,12 @@ def section(data: dict) -> str:
     """Figure, table and what they say."""
     cases = data["cases"]
     rows = [
-        [label, number(cases[k]["mean_mm"], 3), number(cases[k]["max_mm"], 3), number(cases[k]["mean_sweeps"], 3)]
+        [
+            label,
+            millimetres(cases[k]["mean_mm"] / 1e3),
+            millimetres(cases[k]["max_mm"] / 1e3),
+            number(cases[k]["mean_sweeps"], 3),
+        ]
         for k, (_, label, _, _) in CASES.items()
     ]
     plain = {k: cases[k]["mean_mm"] for k in CASES if k != "energy_safe"}
@@ -89,13 +102,15 @@ def section(data: dict) -> str:
     else:
         text += "As in the paper, the solver and its tolerance matter; with any of them the feet still sink, because the contact point moves on along the tangent of its arc within a step. "
     text += (
-        f"Our default step corrects positions at the new configuration, without adding energy: {number(ours, 2)} mm, "
-        f"{number(worst / ours, 2)} times less."
+        f"Our default step corrects positions at the new configuration, without adding energy: {millimetres(ours / 1e3)} mm."
         if 0 < ours < worst
         else f"Our default step: {number(ours, 2)} mm."
     )
     return (
-        figure("fig7_penetration.png", "<b>Fig. 7.</b> Average depth of the four feet below the ground, hanging, 1 ms steps.")
+        figure(
+            "fig7_penetration.png",
+            "<b>Fig. 7.</b> Average depth of the four feet below the ground, hanging, 1 ms steps.",
+        )
         + html_table(["", "Mean, mm", "Largest, mm", "Sweeps per solve"], rows, strong_rows=(len(rows) - 1,))
         + paragraph(text)
     )

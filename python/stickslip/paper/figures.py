@@ -7,7 +7,7 @@ from pathlib import Path
 import matplotlib
 
 matplotlib.use("Agg", force=False)
-import matplotlib.pyplot as plt  # noqa: E402
+import matplotlib.pyplot as plt
 
 INK, MUTED, RULE = "#20242c", "#6b7280", "#e3e6eb"
 
@@ -21,9 +21,6 @@ _STYLE = {
     "axes.linewidth": 0.8,
     "axes.spines.top": False,
     "axes.spines.right": False,
-    "axes.titlesize": 11,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
     "axes.titlepad": 8,
     "axes.grid": True,
     "axes.grid.axis": "y",
@@ -47,7 +44,9 @@ _STYLE = {
 def new(rows: int = 1, columns: int = 1, *, width: float = 7.6, height: float = 3.6, **options):
     """A figure and its axes (always as an array, row-major)."""
     with plt.rc_context(_STYLE):
-        figure, axes = plt.subplots(rows, columns, figsize=(width, height), squeeze=False, layout="constrained", **options)
+        figure, axes = plt.subplots(
+            rows, columns, figsize=(width, height), squeeze=False, layout="constrained", **options
+        )
     return figure, axes.ravel()
 
 
@@ -57,6 +56,11 @@ def save(figure, path: Path, resolution: int = 170) -> Path:
         figure.savefig(path, dpi=resolution)
     plt.close(figure)
     return path
+
+
+def title(axis, text: str, size: float = 11) -> None:
+    """Above the panel, at its left."""
+    axis.set_title(text, loc="left", fontsize=size, fontweight="bold", color=INK)
 
 
 def legend_above(figure, handles, labels, columns: int | None = None) -> None:

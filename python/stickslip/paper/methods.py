@@ -17,6 +17,7 @@ class Method:
     """One way of stepping."""
 
     label: str
+    short: str  #: for a figure's axis
     color: str
     options: dict  #: of `stickslip.World`
 
@@ -25,13 +26,14 @@ _PAPER = {"integrator": "semi_implicit", "tolerance": 1e-6}
 METHODS: dict[str, Method] = {
     "bisection": Method(
         "Bisection",
+        "Bisection",
         "#3566a8",
         {**_PAPER, "method": "per_contact", "law": "max_dissipation", "single_contact": "bisection"}
         | {"alpha": 1.0, "gamma": 0.99, "alpha_min": 0.7},
     ),
-    "pgs": Method("PGS", "#c8553d", {**_PAPER, "method": "pgs", "law": "coulomb", "alpha": 0.6}),
-    "semi_implicit": Method("Ours, the paper's step", "#7fb7a3", {"integrator": "semi_implicit"}),
-    "energy_safe": Method("Ours, default", "#1f8a70", {"integrator": "energy_safe"}),
+    "pgs": Method("PGS", "PGS", "#c8553d", {**_PAPER, "method": "pgs", "law": "coulomb", "alpha": 0.6}),
+    "semi_implicit": Method("Ours, the paper's step", "Ours, plain", "#7fb7a3", {"integrator": "semi_implicit"}),
+    "energy_safe": Method("Ours, default", "Ours", "#1f8a70", {"integrator": "energy_safe"}),
 }
 
 

@@ -22,7 +22,7 @@ p { margin: .7rem 0; max-width: 46rem; }
 a { color: var(--accent); text-decoration-thickness: 1px; text-underline-offset: 2px; }
 code { font: .9em ui-monospace, SFMono-Regular, Menlo, Consolas, monospace; background: #f3f4f6; padding: .1em .35em; border-radius: 4px; }
 nav { font-size: .92rem; margin: 1.4rem 0 0; display: flex; flex-wrap: wrap; gap: .3rem 1.1rem; }
-.cards { display: grid; grid-template-columns: repeat(auto-fit, minmax(12.5rem, 1fr)); gap: .8rem; margin: 2rem 0; padding: 0; }
+.cards { display: grid; grid-template-columns: repeat(auto-fit, minmax(15rem, 1fr)); gap: .8rem; margin: 2rem 0; padding: 0; }
 .cards div { background: #f6f7f9; border-radius: 10px; padding: .9rem 1rem 1rem; }
 .cards dt { font-size: 1.65rem; font-weight: 650; letter-spacing: -0.02em; line-height: 1.25; font-variant-numeric: tabular-nums; }
 .cards dd { margin: .2rem 0 0; font-size: .88rem; line-height: 1.4; color: var(--soft); }
@@ -34,8 +34,10 @@ thead th { font-weight: 600; color: var(--soft); border-bottom: 1.5px solid #c6c
 thead tr.groups th { border-bottom: 0; text-align: center; padding-bottom: 0; color: var(--ink); }
 thead tr.groups th:first-child { text-align: left; }
 tbody td { border-bottom: 1px solid var(--rule); }
+table.dense th, table.dense td { padding: .34rem .42rem; } table.dense { font-size: .86rem; }
 tr.strong td { font-weight: 650; }
 tr.rule td { border-top: 1.5px solid #c6ccd5; }
+sup, sub { line-height: 0; font-size: .72em; }
 figure { margin: 1.3rem 0; }
 figure img { display: block; width: 100%; height: auto; }
 figure .scroll { margin: 0; }
@@ -67,6 +69,7 @@ def html_table(
     strong_rows: Sequence[int] = (),
     rules_before: Sequence[int] = (),
     text_columns: int = 1,
+    dense: bool = False,
 ) -> str:
     """A table that scrolls on a narrow screen; `groups` are (title, columns) above the head."""
 
@@ -84,7 +87,7 @@ def html_table(
         mark = f' class="{" ".join(names)}"' if names else ""
         body.append(f"<tr{mark}>{cells('td', row)}</tr>")
     return (
-        f"<div class=scroll><table><thead>{top}<tr>{cells('th', head)}</tr></thead><tbody>"
+        f"<div class=scroll><table{' class=dense' if dense else ''}><thead>{top}<tr>{cells('th', head)}</tr></thead><tbody>"
         + "\n".join(body)
         + "</tbody></table></div>\n"
     )
@@ -93,7 +96,9 @@ def html_table(
 def figure(file: str, caption: str) -> str:
     """A picture beside the report."""
     alt = html.escape(re.sub(r"<[^>]*>", "", caption), quote=True)
-    return f'<figure><div class=scroll><img src="{file}" alt="{alt}"></div><figcaption>{caption}</figcaption></figure>\n'
+    return (
+        f'<figure><div class=scroll><img src="{file}" alt="{alt}"></div><figcaption>{caption}</figcaption></figure>\n'
+    )
 
 
 def section(anchor: str, title: str, body: str) -> str:

@@ -143,8 +143,10 @@ class Camera:
         return np.stack([right, np.cross(forward, right), forward])
 
 
-def render(parts: Iterable, camera: Camera, width: int, height: int, samples: int = 2) -> NDArray[np.uint8]:
-    """An RGB picture (height, width, 3); `samples` squared rays per pixel."""
+def render(
+    parts: Iterable, camera: Camera, width: int, height: int, samples: int = 2, floor_opacity: float = 1.0
+) -> NDArray[np.uint8]:
+    """An RGB picture (height, width, 3); `samples` squared rays per pixel. What is below the floor shows if it is translucent."""
     parts = list(parts)
     w, h = width * samples, height * samples
     axes = camera.axes()
@@ -169,15 +171,15 @@ def render(parts: Iterable, camera: Camera, width: int, height: int, samples: in
         color[window][nearer], glow[window][nearer] = part.color, part.glow
 
     shadow = _ShadowMap([p for p in parts if p.glow == 0])
-    picture = np.empty((h, w, 3))
+    picture = np.broadcast_to(_BACKGROUND, (h, w, 3)).copy()
     floor = -camera.eye[2] / np.minimum(direction[..., 2], -1e-9)
     on_floor = (direction[..., 2] < 0) & (floor < distance)
-    body = np.isfinite(distance) & ~on_floor
-    sky = ~body & ~on_floor
-    picture[sky] = _BACKGROUND
-    picture[on_floor] = _shade_floor(camera, direction[on_floor], floor[on_floor], shadow, parts)
+    body = np.isfinite(distance) & (~on_floor if floor_opacity == 1 else True)
     points = camera.eye + distance[body][:, None] * direction[body]
     picture[body] = _shade_body(points, normal[body], direction[body], color[body], glow[body], shadow)
+    tiles = _shade_floor(camera, direction[on_floor], floor[on_floor], shadow, parts)
+    below = body[on_floor][:, None]
+    picture[on_floor] = np.where(below, picture[on_floor] + floor_opacity * (tiles - picture[on_floor]), tiles)
     picture = picture.reshape(height, samples, width, samples, 3).mean(axis=(1, 3))
     return (np.clip(picture, 0, 1) ** (1 / 1.08) * 255 + 0.5).astype(np.uint8)
 
@@ -272,7 +274,7 @@ def _floor_occlusion(points: Array, parts: list) -> Array:
             continue
         end, radius = min(((part.a, part.radius_a), (part.b, part.radius_b)), key=lambda e: e[0][2] - e[1])
         height = max(end[2], radius)
-        if height > 4 * radius:
+        if end[2] < -radius or height > 4 * radius:
             continue
         offset = points - end[:2]
         d2 = _dot(offset, offset) + height * height
@@ -286,7 +288,7 @@ def _shade_body(points: Array, normal: Array, direction: Array, color: Array, gl
     facing = np.clip(normal @ _LIGHT, 0, 1) * lit
     up = (normal[:, 2:] + 1) / 2
     ambient = _BOUNCE + up * (_SKY - _BOUNCE)
-    near_ground = np.clip(points[:, 2:] / 0.12, 0, 1) * 0.35 + 0.65
+    near_ground = np.clip(np.abs(points[:, 2:]) / 0.12, 0, 1) * 0.35 + 0.65
     half = _LIGHT - direction
     half /= np.sqrt(_dot(half, half))[:, None]
     gloss = 0.22 * np.clip(_dot(normal, half), 0, 1) ** 40 * lit

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import html
 import json
 import math
+import re
 import time
 from dataclasses import asdict
 from pathlib import Path
@@ -14,7 +16,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from stickslip.paper import fifty_hertz, fig5, fig6, fig7, machine, page, published, strips, table1, table2
 from stickslip.paper.methods import TASKS
 from stickslip.paper.settings import Settings
-from stickslip.paper.words import geometric_mean, number, percent
+from stickslip.paper.words import geometric_mean, millimetres, number, percent
 
 #: In the order of the report; each has TITLE, work, measure, draw, section.
 EXPERIMENTS = {
@@ -36,7 +38,12 @@ def write_report(folder: Path, settings: Settings) -> int:
     console = Console()
     start = time.perf_counter()
     results: dict = {"settings": asdict(settings), "machine": machine.describe()}
-    columns = (TextColumn("{task.description:<34}"), BarColumn(32), TextColumn("{task.percentage:>3.0f} %"), TimeElapsedColumn())
+    columns = (
+        TextColumn("{task.description:<34}"),
+        BarColumn(32),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeElapsedColumn(),
+    )
     with Progress(*columns, console=console) as progress:
         bars = {
             key: progress.add_task(EXPERIMENTS[key].TITLE, total=EXPERIMENTS[key].work(settings), start=False)
@@ -56,11 +63,13 @@ def write_report(folder: Path, settings: Settings) -> int:
                 experiment.draw(results[key], folder)
             progress.update(bar, completed=experiment.work(settings))
     results["seconds"] = time.perf_counter() - start
-    (folder / "results.json").write_text(json.dumps(_plain(results), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    (folder / "results.json").write_text(
+        json.dumps(_plain(results), indent=1, allow_nan=False) + "\n", encoding="utf-8"
+    )
     write_page(folder, results)
     console.print(f"\n{folder / 'report.html'} and its data, in {results['seconds']:.0f} s\n")
     for value, what in _headlines(results):
-        console.print(f"  [bold]{_text(value):>14}[/]  {_text(what)}")
+        console.print(f"  [bold]{_text(value):>14}[/]  {_text(what)}", soft_wrap=True)
     return 0
 
 
@@ -78,7 +87,14 @@ def write_page(folder: Path, results: dict) -> None:
             else "A quick run with fewer samples; <code>stickslip paper --full</code> takes the paper's counts."
         )
     )
-    names = {"processor": "Processor", "compiler": "Compiler", "system": "System", "stickslip": "stickslip", "python": "Python", "numpy": "NumPy"}
+    names = {
+        "processor": "Processor",
+        "compiler": "Compiler",
+        "system": "System",
+        "stickslip": "stickslip",
+        "python": "Python",
+        "numpy": "NumPy",
+    }
     foot = (
         "<dl>"
         + "".join(f"<dt>{names[k]}</dt><dd>{facts[k]}</dd>" for k in names)
@@ -88,7 +104,7 @@ def write_page(folder: Path, results: dict) -> None:
     )
     page.write(
         folder / "report.html",
-        title="The per-contact iteration method, running",
+        title="The paper, running",
         lead=lead,
         top=page.cards(_headlines(results)),
         parts=parts,
@@ -103,20 +119,47 @@ def _headlines(results: dict) -> list[tuple[str, str]]:
     solved = [d["methods"] for d in one["tasks"].values() if d["methods"]]
     if solved:
         ns = {m: geometric_mean([d[m]["ns_per_solve"] for d in solved]) for m in ("bisection", "halley")}
-        out.append((f"{number(ns['halley'], 2)} ns", f"per sliding contact with Halley's method; bisection {number(ns['bisection'], 2)} ns, paper 580 ns"))
-    micro = {m: [10 * steps["tasks"][t][m]["seconds_per_100k_steps"] for t in TASKS] for m in ("bisection", "energy_safe")}
+        out.append(
+            (
+                f"{number(ns['halley'], 2)} ns",
+                f"per sliding contact with Halley's method; bisection {number(ns['bisection'], 2)} ns, paper 580 ns",
+            )
+        )
+    micro = {
+        m: [10 * steps["tasks"][t][m]["seconds_per_100k_steps"] for t in TASKS] for m in ("bisection", "energy_safe")
+    }
     theirs = [10 * v for v in published.STEPS_100K["bisection"].values()]
     out.append(
-        (f"{number(min(micro['energy_safe']), 2)}–{number(max(micro['energy_safe']), 2)} µs", f"per default step of the four tasks; paper {number(min(theirs), 2)}–{number(max(theirs), 2)} µs")
+        (
+            f"{number(min(micro['energy_safe']), 2)}–{number(max(micro['energy_safe']), 2)} µs",
+            f"per default step of the four tasks; paper {number(min(theirs), 2)}–{number(max(theirs), 2)} µs",
+        )
     )
     fewer = [steps["tasks"][t]["pgs"]["mean"] / max(steps["tasks"][t]["bisection"]["mean"], 1e-9) for t in TASKS]
-    out.append((f"{number(min(fewer), 2)}–{number(max(fewer), 2)} ×", "fewer sweeps by per-contact iteration than by PGS, mean per task"))
+    out.append(
+        (
+            f"{number(min(fewer), 2)}–{number(max(fewer), 2)} ×",
+            "fewer sweeps by per-contact iteration than by PGS, mean per task",
+        )
+    )
     sliding = sum(d["sliding"]["contacts"] for d in laws["tasks"].values())
     if sliding:
-        below = sum(d["sliding"]["contacts"] * d["sliding"]["below_1_percent"] for d in laws["tasks"].values()) / sliding
-        out.append((percent(below), "of sliding contacts agree within 1 % under the two friction laws; paper 99.6 % of all contacts"))
+        below = (
+            sum(d["sliding"]["contacts"] * d["sliding"]["below_1_percent"] for d in laws["tasks"].values()) / sliding
+        )
+        out.append(
+            (
+                percent(below),
+                "of sliding contacts agree within 1 % under the two friction laws; paper 99.6 % of all contacts",
+            )
+        )
     ours, plain = hang["cases"]["energy_safe"]["mean_mm"], hang["cases"]["bisection"]["mean_mm"]
-    out.append((f"{number(ours, 2)} mm", f"mean penetration of hanging feet; {number(plain, 2)} mm with the paper's step"))
+    out.append(
+        (
+            f"{millimetres(ours / 1e3)} mm",
+            f"mean penetration of hanging feet; {number(plain, 2)} mm with the paper's step",
+        )
+    )
     last = {i: large["cases"]["drop"][i][-1] for i in ("semi_implicit", "energy_safe")}
     dt = 1e3 * large["time_steps"][-1]
     out.append(
@@ -129,9 +172,7 @@ def _headlines(results: dict) -> list[tuple[str, str]]:
 
 
 def _text(markup: str) -> str:
-    import re
-
-    return re.sub(r"<sup>(.*?)</sup>", r"^\1", markup)
+    return html.unescape(re.sub(r"<sup>(.*?)</sup>", r"^\1", markup))
 
 
 def _plain(value):

@@ -17,8 +17,8 @@ _DARK = (0.17, 0.18, 0.20)
 _LINK = (0.74, 0.76, 0.79)
 _RUBBER = (0.10, 0.10, 0.11)
 _FORCE = (0.05, 0.45, 0.80)
-_METERS_PER_NEWTON = 0.9 / 300  # an arrow as long as this for the robot's weight
-_LONGEST = 1.0  # [m]
+_METERS_PER_NEWTON = 0.6 / 300  # an arrow as long as this for the robot's weight
+_LONGEST = 0.75  # [m]
 _FOOT_RADIUS = 0.031
 _FOOT_OFFSET = np.array([0, 0, 0.02325])  # of the sphere, in the frame of the foot
 
@@ -83,17 +83,25 @@ class Shot:
 
     parts: list
     camera: Camera
+    floor_opacity: float = 1.0
 
     @classmethod
     def of(
-        cls, scene: Scene, *, distance: float = 3.0, azimuth: float = -52, elevation: float = 13, look_up: float = 0.42
+        cls,
+        scene: Scene,
+        *,
+        distance: float = 3.0,
+        azimuth: float = -52,
+        elevation: float = 13,
+        look_up: float = 0.42,
+        floor_opacity: float = 1.0,
     ) -> Shot:
         """The scene now, from `distance` [m] and two angles [degree], the camera above the same point as the base."""
         q = scene.robot.q
         target = np.array([q[0], q[1], look_up])
         a, e = np.radians(azimuth), np.radians(elevation)
         eye = target + distance * np.array([np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)])
-        return cls(robot_parts(scene) + force_parts(scene), Camera(eye, target))
+        return cls(robot_parts(scene) + force_parts(scene), Camera(eye, target), floor_opacity)
 
 
 def _rotation(quaternion: Array) -> Array:
@@ -109,4 +117,3 @@ def _rotation(quaternion: Array) -> Array:
 
 def _unit(v: Array) -> Array:
     return v / max(float(np.linalg.norm(v)), 1e-12)
-

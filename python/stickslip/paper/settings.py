@@ -11,7 +11,7 @@ class Settings:
 
     name: str = "quick"
     slip_samples: int = 20_000  #: sliding contacts per task for Table I
-    slip_max_steps: int = 500_000  #: and how long to look for them
+    slip_max_steps: int = 200_000  #: and how long to look for them
     single_rounds: int = 7  #: timings of each method in Table I; the median counts
     timed_steps: int = 20_000  #: per task and method for Table II
     timed_rounds: int = 3
@@ -38,7 +38,7 @@ def full() -> Settings:
     return Settings(
         name="full",
         slip_samples=100_000,
-        slip_max_steps=20_000_000,
+        slip_max_steps=4_000_000,
         single_rounds=15,
         timed_steps=100_000,
         timed_rounds=5,

@@ -19,14 +19,14 @@ TITLE = "The four tasks"
 _TIMES = {
     "trot": (4.00, 4.08, 4.16, 4.24, 4.32, 4.40),
     "hang": (0.00, 0.35, 0.65, 1.00, 1.60, 3.00),
-    "drop": (0.00, 0.25, 0.42, 0.60, 0.90, 1.80),
-    "random": (0.50, 1.10, 1.70, 2.30, 2.90, 3.50),
+    "drop": (0.00, 0.25, 0.42, 0.52, 0.70, 1.20),
+    "random": (0.30, 0.55, 0.85, 1.10, 1.70, 2.30),
 }
 _VIEWS = {
     "trot": {"distance": 2.55, "look_up": 0.36},
-    "hang": {"distance": 3.0, "look_up": 0.50},
-    "drop": {"distance": 3.0, "look_up": 0.46},
-    "random": {"distance": 3.0, "look_up": 0.46},
+    "hang": {"distance": 4.4, "look_up": 0.30, "elevation": 6, "floor_opacity": 0.45},
+    "drop": {"distance": 3.15, "look_up": 0.52},
+    "random": {"distance": 2.9, "look_up": 0.42},
 }
 _CAPTIONS = {
     "trot": "<b>Trot</b> at 1.5 m/s, by a controller that places the feet and distributes the stance forces.",
@@ -45,7 +45,9 @@ def measure(settings: Settings, tick) -> dict:
     """The moments that are shown; the pictures are drawn with them at hand."""
     return {
         "tasks": {
-            task: [float(t) for t in np.asarray(times)[np.linspace(0, len(times) - 1, settings.frames).round().astype(int)]]
+            task: [
+                float(t) for t in np.asarray(times)[np.linspace(0, len(times) - 1, settings.frames).round().astype(int)]
+            ]
             for task, times in _TIMES.items()
         },
         "size": list(settings.frame_size),
@@ -60,7 +62,9 @@ def draw(data: dict, folder: Path, tick=lambda n: None) -> list:
             shots = _shots(task, data["tasks"][task])
 
             def picture(shot, tick=tick):
-                image = Image.fromarray(render(shot.parts, shot.camera, *data["size"]))
+                image = Image.fromarray(
+                    render(shot.parts, shot.camera, *data["size"], floor_opacity=shot.floor_opacity)
+                )
                 tick(1)
                 return image
 
@@ -93,7 +97,9 @@ def strip(frames: list[Image.Image], labels: list[str] | None = None, gap: int =
         left = k * (width + gap)
         out.paste(frame, (left, 0))
         if labels:
-            ImageDraw.Draw(out).text((left + width / 2, height + foot / 2), labels[k], (91, 100, 114), _font(size), anchor="mm")
+            ImageDraw.Draw(out).text(
+                (left + width / 2, height + foot / 2), labels[k], (91, 100, 114), _font(size), anchor="mm"
+            )
     return out
 
 
@@ -107,12 +113,14 @@ def section(data: dict) -> str:
     """The frames, three or six in a row."""
     out = paragraph(
         "ANYmal B, 30.5 kg, 18 degrees of freedom; the torso's box and four foot spheres collide. Default step, 1 ms. Arrows are "
-        "contact forces: one as long as 0.9 m carries the robot's weight."
+        "contact forces: one of 0.6 m carries the robot's weight."
     )
     for task, times in data["tasks"].items():
         frames = "".join(
             f'<div><img src="frame_{task}_{k}.jpg" alt="{TASKS[task]} at {t:.2f} s"><span>{t:.2f} s</span></div>'
             for k, t in enumerate(times)
         )
-        out += f'<figure class=strip><div class=frames>{frames}</div><figcaption>{_CAPTIONS[task]}</figcaption></figure>\n'
+        out += (
+            f"<figure class=strip><div class=frames>{frames}</div><figcaption>{_CAPTIONS[task]}</figcaption></figure>\n"
+        )
     return out

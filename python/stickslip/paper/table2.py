@@ -10,7 +10,7 @@ from stickslip.paper import figures, published
 from stickslip.paper.methods import METHODS, TASKS, Records, advance, record, scene_of
 from stickslip.paper.page import figure, html_table, paragraph
 from stickslip.paper.settings import Settings
-from stickslip.paper.words import listed, number, percent, spread
+from stickslip.paper.words import count, listed, number, percent, spread
 
 TITLE = "Table II and Fig. 4: whole steps"
 _EDGES = [0.5, 1.5, *(2.0**k + 0.5 for k in range(1, 17))]  # 1, 2, 3-4, 5-8, ...
@@ -65,7 +65,9 @@ def _effort(r: Records) -> dict:
 def draw(data: dict, folder) -> list:
     """Fig. 4."""
     shown = ("bisection", "pgs", "energy_safe")
-    used = [i for d in data["tasks"].values() for m in shown for i, v in enumerate(d[m]["histogram_percent"]) if v > 0]
+    used = [
+        i for d in data["tasks"].values() for m in shown for i, v in enumerate(d[m]["histogram_percent"]) if v >= 0.01
+    ]
     last = max(used, default=0) + 1
     labels = ["1", "2", *(f"{2 ** (k - 1) + 1}–{2**k}" for k in range(2, last))][:last]
     fig, axes = figures.new(2, 2, height=5.4, sharex=True, sharey=True)
@@ -74,7 +76,7 @@ def draw(data: dict, folder) -> list:
         for k, m in enumerate(shown):
             values = np.array(data["tasks"][task][m]["histogram_percent"][:last])
             axis.bar(x + 0.27 * (k - 1), values, 0.27, color=METHODS[m].color, label=METHODS[m].label)
-        axis.set_title(name)
+        figures.title(axis, name)
         axis.set_xticks(x, labels, rotation=55, ha="right", rotation_mode="anchor", fontsize=8)
         axis.margins(x=0.01)
     for axis in axes[::2]:
@@ -88,7 +90,7 @@ def draw(data: dict, folder) -> list:
 def section(data: dict) -> str:
     """Both tables, the figure and what they say."""
     tasks = data["tasks"]
-    head = ["Seconds per 100 000 steps", *TASKS.values()]
+    head = ["Seconds per 100 000 steps", *TASKS.values()]
     rows, emphasis = [], (len(METHODS) - 1,)
     for m, method in METHODS.items():
         rows.append([method.label, *(number(tasks[t][m]["seconds_per_100k_steps"]) for t in TASKS)])
@@ -106,7 +108,7 @@ def section(data: dict) -> str:
     ]
     return (
         time_table
-        + html_table(head, rows, groups=groups, strong_rows=emphasis)
+        + html_table(head, rows, groups=groups, strong_rows=emphasis, dense=True)
         + "".join(paragraph(p) for p in _sentences(data))
         + figure(
             "fig4_iterations.png",
@@ -127,24 +129,24 @@ def _sentences(data: dict) -> list[str]:
     gain = {t: s[t]["pgs"] / s[t]["bisection"] for t in TASKS}
     paper_gain = {t: published.STEPS_100K["pgs"][t] / published.STEPS_100K["bisection"][t] for t in TASKS}
     out = [
-        f"Processor time of one core over {number(data['timed_steps'], 6)} steps per task, scaled; medians of interleaved "
+        f"Processor time of one core over {count(data['timed_steps'])} steps per task, scaled; medians of interleaved "
         "runs. Bisection and PGS have the paper's settings (α = 1 decaying to 0.7 with γ = 0.99; α = 0.6; each with its own stopping "
         "test at 10<sup>−6</sup>) and step by semi-implicit Euler at 1 ms; all start from the impulses of the last step. Ours solve Coulomb's law (eq. 6) to a residual of "
         "10<sup>−9</sup> m/s plus 10<sup>−8</sup> of the contact speed."
     ]
     all_fewer = [TASKS[t].lower() for t in TASKS if fewer[t] > 1]
     worst = max(max(tasks[t]["pgs"]["max_at_impact"], tasks[t]["pgs"]["max"]) for t in TASKS)
-    claim = "on every task" if len(all_fewer) == len(TASKS) else f"on {listed(all_fewer)}" if all_fewer else "on no task"
+    claim = (
+        "on every task" if len(all_fewer) == len(TASKS) else f"on {listed(all_fewer)}" if all_fewer else "on no task"
+    )
     text = f"Per-contact iteration needs fewer sweeps than PGS {claim}: {spread(list(fewer.values()))} times fewer on average"
     if impact:
         text += ", and at impact " + listed([f"{number(v, 2)} times in {TASKS[t].lower()}" for t, v in impact.items()])
     out.append(
         text
-        + f". PGS took at most {number(worst, 6)} sweeps here; the paper saw more than {number(published.PGS_SWEEPS_AT_IMPACT, 6)} at impacts."
+        + f". PGS took at most {count(worst)} sweeps here; the paper saw more than {count(published.PGS_SWEEPS_AT_IMPACT)} at impacts."
     )
-    both = listed(
-        [f"{TASKS[t].lower()} {number(gain[t], 2)} (paper {number(paper_gain[t], 2)})" for t in TASKS]
-    )
+    both = listed([f"{TASKS[t].lower()} {number(gain[t], 2)} (paper {number(paper_gain[t], 2)})" for t in TASKS])
     out.append(
         f"Time of PGS over time of bisection: {both}. A sweep of PGS is a handful of multiplications, a sweep of bisection "
         "solves every contact, so fewer sweeps do not always mean less time. The paper's tail at impacts weighs more or less with how often the robot lands, which it does not state."
@@ -159,7 +161,10 @@ def _sentences(data: dict) -> list[str]:
         f"step costs {spread(safe)} times that one and keeps the feet on the ground (Fig. 7). "
         f"Against the paper's table it is {spread(theirs)} times as fast, of which a good part is the newer processor. "
         f"Its residual was at most {number(tight, 2)} m/s in 99.99 % of the steps"
-        + (f"; {percent(fails)} of the steps of the worst task ended above the tolerance and say so." if fails else "; every step reached its tolerance.")
+        + (
+            f"; {percent(fails)} of the steps of the worst task ended above the tolerance and say so."
+            if fails
+            else "; every step reached its tolerance."
+        )
     )
     return out
-

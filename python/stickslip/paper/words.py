@@ -17,17 +17,31 @@ def number(value: float, digits: int = 3) -> str:
         mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
         mantissa = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
         return f"{mantissa}·10<sup>{int(exponent)}</sup>".replace("-", "−")
-    return f"{round(value, digits - 1 - size):,.{max(digits - 1 - size, 0)}f}".replace(",", "\u2009").replace("-", "−")
+    return f"{round(value, digits - 1 - size):,.{max(digits - 1 - size, 0)}f}".replace(",", "\u202f").replace("-", "−")
+
+
+def count(value: float) -> str:
+    """A whole number, thousands separated."""
+    return f"{round(value):,}".replace(",", "\u202f")
 
 
 def percent(share: float) -> str:
     """A share as percent, with digits where they matter (near 0 and near 1)."""
     value = 100 * share
     if value in (0.0, 100.0):
-        return f"{value:.0f} %"
-    if value < 0.1 or value > 99.9:
-        return f"{value:.3f} %"
-    return f"{value:.1f} %"
+        return f"{value:.0f}\u00a0%"
+    if value < 0.1 or 99.9 < value < 100:
+        return f"{value:.3f}\u00a0%"
+    if value >= 99.95:
+        return f"{value:.0f}\u00a0%"
+    return f"{value:.1f}\u00a0%"
+
+
+def millimetres(metres: float | None) -> str:
+    """A length; below a nanometre it is said so and no more."""
+    if metres is None:
+        return "–"
+    return "&lt; 10<sup>−6</sup>" if 0 < metres < 1e-9 else number(1e3 * metres, 2)
 
 
 def times(ratio: float) -> str:
@@ -43,7 +57,7 @@ def listed(items: Sequence[str]) -> str:
 
 
 def spread(values: Sequence[float], digits: int = 2) -> str:
-    """"3.1 to 5.2", or one number where they agree."""
+    """ "3.1 to 5.2", or one number where they agree."""
     low, high = number(min(values), digits), number(max(values), digits)
     return low if low == high else f"{low} to {high}"
 
