@@ -107,6 +107,9 @@ void ContactStage::detect_reachable(const Tree<double>& tree, double clearance,
                                     std::sqrt(dot(v.ang, v.ang)) * s.bounding_radius);
   }
   detect_within(tree, clearance, kReach + 2 * h * fastest);
+  // The rows are those of the points on the plane below: a gap then closes without a tangential
+  // velocity of its own, and the allowed approach of coplanar points is one rigid motion.
+  for (int i = 0; i < count_; ++i) active_[i].position.z = -clearance;
   compute_velocities(tree, base_velocity);
   int kept = 0;
   for (int i = 0; i < count_; ++i) {
@@ -129,9 +132,10 @@ void ContactStage::compute_velocities(const Tree<double>& tree, const Vec3<doubl
         base_velocity;
 }
 
-void ContactStage::allow_closing(double h) {
-  for (int i = 0; i < count_; ++i)
-    if (active_[i].gap > 0) active_[i].shift = active_[i].gap / h;
+void ContactStage::allow_closing(double h, double tolerance) {
+  // Within the tolerance an overlap counts like a gap. Clamped at zero, the gaps of coplanar points
+  // would no longer be those of one rigid motion, and the problem would be nearly contradictory.
+  for (int i = 0; i < count_; ++i) active_[i].shift = std::max(active_[i].gap, -tolerance) / h;
 }
 
 void ContactStage::add_restitution(double kick, double h) {
@@ -139,8 +143,10 @@ void ContactStage::add_restitution(double kick, double h) {
     ActiveContact& a = active_[i];
     const MaterialPair& law = laws_[a.shape];
     const double before = a.velocity.z - kick;
+    // The rebound is kicked like any motion: with e = 1 a ball keeps its energy. Not into the
+    // ground.
     if (law.restitution > 0 && -before > law.restitution_threshold && a.gap + h * a.velocity.z < 0)
-      a.shift = law.restitution * before;
+      a.shift = std::min(law.restitution * before - kick, std::max(0.0, a.gap) / h);
   }
 }
 

@@ -51,8 +51,9 @@ class ContactStage {
 
   /// Velocities of the active points from the link velocities.
   void compute_velocities(const dynamics::Tree<double>& tree, const Vec3<double>& base_velocity);
-  /// Speculative contacts: a point at `gap` above the ground may approach with gap / h.
-  void allow_closing(double h);
+  /// Speculative contacts: a point at `gap` above the ground may approach with gap / h; one that
+  /// overlaps is not pushed out faster than tolerance / h.
+  void allow_closing(double h, double tolerance);
   /// Newton's restitution where the gap closes within h. Approach speeds are taken before the kick
   /// of this step: `kick` is what it added to normal velocities [m/s].
   void add_restitution(double kick, double h);

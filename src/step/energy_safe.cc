@@ -152,8 +152,9 @@ class EnergySafeStep {
   void free_motion(double h) {
     double* free = robot_.u_free.data();
     std::copy(robot_.state.u.begin(), robot_.state.u.end(), free);
-    const double fall = robot_.state.pending_gravity + 0.5 * h;
-    add_gravity(fall, free);
+    late_ = balanced() ? 0 : 0.5 * h;
+    fall_ = robot_.state.pending_gravity + h - late_;
+    add_gravity(fall_, free);
     double* tau = robot_.force.data();
     if (control_force(robot_, q(), u(), h, tau)) {
       t_.base.force = zero_spatial<double>();
@@ -165,6 +166,15 @@ class EnergySafeStep {
     dynamics::compute_velocities(t_, robot_.angular(free), free + offset_);
     dynamics::multiply_lower(t_, robot_.linear(free), free + offset_);
     timer_.end(&StageTimes::dynamics);
+  }
+
+  /// A drive may hold the weight: its kick is whole, so gravity's must be, or a hovering robot
+  /// climbs and a held arm reports a speed. Joint drives of a floating robot cannot.
+  bool balanced() const {
+    const RobotControl& c = robot_.control;
+    if (!offset_) return c.force || c.pd;
+    return c.force && std::any_of(c.generalized_force.begin(), c.generalized_force.begin() + 6,
+                                  [](double x) { return x != 0; });
   }
 
   /// velocity += gravity over `time`. A floating base falls as a whole; a fixed one needs M^-1.
@@ -197,9 +207,8 @@ class EnergySafeStep {
       std::fill(robot_.state.impulse.begin(), robot_.state.impulse.end(), 0.0);
       return;
     }
-    c.allow_closing(h);
-    const double fall = robot_.state.pending_gravity + 0.5 * h;
-    c.add_restitution(offset_ ? fall * context_.gravity.z : 0, h);
+    c.allow_closing(h, kOverlapTolerance);
+    c.add_restitution(offset_ ? fall_ * context_.gravity.z : 0, h);
     c.build_problem(t_, false);
     timer_.end(&StageTimes::delassus);
     const double worst = robot_.info.residual;
@@ -209,10 +218,10 @@ class EnergySafeStep {
     if (pushed_) {
       c.add_impulses(t_);
       solve_lower(robot_.u_plus.data());
-      // Half of gravity's kick belongs to the time after the impulses: its work is the weight's,
-      // not theirs.
+      // What is left of gravity's kick belongs to the time after the impulses: its work is the
+      // weight's, not theirs.
       const Vec3<double> p = c.total_impulse();
-      given_ = std::max(0.0, c.work() - 0.5 * h * dot(p, context_.gravity));
+      given_ = std::max(0.0, c.work() - late_ * dot(p, context_.gravity));
     }
     timer_.end(&StageTimes::solve);
   }
@@ -288,8 +297,8 @@ class EnergySafeStep {
     if (!offset_) gravity_acceleration();
     // Without contact the second half of gravity's kick completes u; in contact the ground will
     // take part in it (S14).
-    s.pending_gravity = pushed_ ? 0.5 * h : 0;
-    if (!pushed_) add_gravity(0.5 * h, u());
+    s.pending_gravity = pushed_ ? late_ : 0;
+    if (!pushed_ && late_ > 0) add_gravity(late_, u());
     timer_.end(&StageTimes::integrate);
   }
 
@@ -353,6 +362,8 @@ class EnergySafeStep {
   dynamics::Tree<double>& t_;
   const int offset_, nu_;
   StageTimer timer_;
+  double fall_ = 0;      // time of gravity that the last kick took ...
+  double late_ = 0;      // ... and that it left for later [s]
   double given_ = 0;     // energy the impulses of the last kick gave [J]
   bool pushed_ = false;  // the last kick had a contact impulse
 };
