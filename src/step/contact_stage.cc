@@ -287,6 +287,7 @@ double ContactStage::work() const {
 
 ContactProblem ContactStage::explicit_problem() const {
   ContactProblem p;
+  if (count_ == 0) return p;  // the factored problem may be an older step's
   const size_t n = count_;
   p.delassus.resize(9 * n * n);
   p.free_velocity.resize(3 * n);
