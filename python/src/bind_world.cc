@@ -184,6 +184,7 @@ void bind_robot(nb::module_& m) {
       .def("frame_pose", &Robot::frame_pose, "frame"_a)
       .def("delassus", &delassus, "bodies"_a, "points"_a)
       .def_prop_ro("kinetic_energy", &Robot::kinetic_energy)
+      .def_prop_ro("mechanical_energy", &Robot::mechanical_energy)
       .def_prop_ro("potential_energy", &Robot::potential_energy)
       .def_prop_ro(
           "center_of_mass", [](const Robot& r) { return array3(r.center_of_mass()); },

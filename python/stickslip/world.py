@@ -234,6 +234,14 @@ class Robot:
         return self._core.delassus(indices, array("points", points, (len(indices), 3)).tolist())
 
     @property
+    def mechanical_energy(self) -> float:
+        """Kinetic plus potential energy at the time of `q`, as the integrator accounts for it [J].
+
+        While in contact, `u` of the energy-safe step lacks half a step of gravity; this adds it. Contacts never make it grow.
+        """
+        return self._core.mechanical_energy
+
+    @property
     def kinetic_energy(self) -> float:
         """Of the velocity `u` [J]."""
         return self._core.kinetic_energy
