@@ -15,29 +15,26 @@ struct ContactRows {
   Row3<S> base[6];  // columns of the base, order of u
 };
 
-/// `point` relative to the base origin; rows of `frame` are the contact axes x, y, z in world axes.
+/// `point` relative to the base origin; contact axes along the world's.
 template <class S>
 void compute_contact_rows(const Tree<S>& t, LinkIndex link, const Vec3<S>& point,
-                          const Mat3<S>& frame, ContactRows<S>& rows) {
-  const S* e = frame.m;
-  const Vec3<S> ex{e[0], e[1], e[2]}, ey{e[3], e[4], e[5]}, ez{e[6], e[7], e[8]};
-  const Vec3<S> mx = cross(point, ex), my = cross(point, ey), mz = cross(point, ez);
+                          ContactRows<S>& rows) {
+  const S o = constant<S>(0), one = constant<S>(1);
   // Unit test forces at the point, one per row: [0..2] force, [3..5] moment about the base origin.
-  Row3<S> f[6] = {make_row3(ex.x, ey.x, ez.x), make_row3(ex.y, ey.y, ez.y),
-                  make_row3(ex.z, ey.z, ez.z), make_row3(mx.x, my.x, mz.x),
-                  make_row3(mx.y, my.y, mz.y), make_row3(mx.z, my.z, mz.z)};
+  Row3<S> f[6] = {make_row3(one, o, o),
+                  make_row3(o, one, o),
+                  make_row3(o, o, one),
+                  make_row3(o, -point.z, point.y),
+                  make_row3(point.z, o, -point.x),
+                  make_row3(-point.y, point.x, o)};
   rows.depth = 0;
   while (link.slot != kBaseSlot) {
     const auto& state = t.links[link.slot];
     const auto at = [&](const Wide<S>& w) { return lane_of<S>(w, link.lane); };
     const Spatial<Wide<S>>&s = state.axis, &u = state.arm;
-    Row3<S> z = f[3] * at(s.ang.x);
-    z = madd(f[4], at(s.ang.y), z);
-    z = madd(f[5], at(s.ang.z), z);
-    z = madd(f[0], at(s.lin.x), z);
-    z = madd(f[1], at(s.lin.y), z);
-    z = madd(f[2], at(s.lin.z), z);
-    z = z * at(state.inv_root);
+    const Row3<S> turn = madd(f[5], at(s.ang.z), madd(f[4], at(s.ang.y), f[3] * at(s.ang.x)));
+    const Row3<S> slide = madd(f[2], at(s.lin.z), madd(f[1], at(s.lin.y), f[0] * at(s.lin.x)));
+    const Row3<S> z = (turn + slide) * at(state.inv_root);
     f[0] = nmadd(z, at(u.lin.x), f[0]);
     f[1] = nmadd(z, at(u.lin.y), f[1]);
     f[2] = nmadd(z, at(u.lin.z), f[2]);

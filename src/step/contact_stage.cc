@@ -26,10 +26,6 @@ char* aligned_block(long bytes) {
 }
 void free_block(char* block) { ::operator delete(block, std::align_val_t(64)); }
 
-Mat3<double> ground_frame() {
-  return {{1, 0, 0, 0, 1, 0, 0, 0, 1}};
-}  // x, y along the world's, z up
-
 }  // namespace
 
 ContactStage::ContactStage(const Model& model, const dynamics::TreeLayout& layout, int max_depth)
@@ -153,10 +149,9 @@ void ContactStage::add_restitution(double kick, double h) {
 // ---- the factored problem
 
 void ContactStage::build_problem(Tree<double>& tree, bool with_x) {
-  const Mat3<double> frame = ground_frame();
   for (int i = 0; i < count_; ++i) {
     ActiveContact& a = active_[i];
-    dynamics::compute_contact_rows(tree, shapes_[a.shape].link, a.position, frame, a.rows);
+    dynamics::compute_contact_rows(tree, shapes_[a.shape].link, a.position, a.rows);
     for (int k = 0; k < a.rows.depth; ++k) ++uses_[flat(a.rows.path[k])];
   }
   // Joints on several paths are shared dofs, numbered from the base outward, contact by contact.
@@ -183,20 +178,25 @@ void ContactStage::build_problem(Tree<double>& tree, bool with_x) {
     for (int k = 0; k < base_dofs; ++k) y[k] = a.rows.base[k], index_[k] = k;
     int touched = base_dofs;
     Row3<double> offset = make_row3(a.velocity.x, a.velocity.y, a.velocity.z + a.shift);
-    double* p = problem_.private_block(c);
+    Row3<double> own[3];  // columns of the private block
+    for (auto& column : own) column = make_row3(0.0, 0.0, 0.0);
     for (int k = a.rows.depth - 1; k >= 0; --k) {
       const LinkIndex link = a.rows.path[k];
+      const Row3<double>& row = a.rows.joint[k];
       if (const int dof = shared_dof_[flat(link)]; dof >= 0) {
-        y[touched] = a.rows.joint[k];
+        y[touched] = row;
         index_[touched++] = dof;
         continue;
       }
       double z[3];
-      store(a.rows.joint[k], z);
-      p[0] = madd(z[0], z[0], p[0]), p[1] = madd(z[0], z[1], p[1]), p[2] = madd(z[0], z[2], p[2]);
-      p[3] = madd(z[1], z[1], p[3]), p[4] = madd(z[1], z[2], p[4]), p[5] = madd(z[2], z[2], p[5]);
-      if (with_x) offset = madd(a.rows.joint[k], x_of(link), offset);
+      store(row, z);
+      for (int r = 0; r < 3; ++r) own[r] = madd(row, z[r], own[r]);
+      if (with_x) offset = madd(row, x_of(link), offset);
     }
+    double columns[3][3], *p = problem_.private_block(c);
+    for (int r = 0; r < 3; ++r) store(own[r], columns[r]);
+    p[0] = columns[0][0], p[1] = columns[0][1], p[2] = columns[0][2];
+    p[3] = columns[1][1], p[4] = columns[1][2], p[5] = columns[2][2];
     if (num_shared > 0 || !floating_) problem_.set_index(c, index_.data(), touched);
     store(offset, problem_.offset(c));
     problem_.friction(c) = laws_[a.shape].friction;

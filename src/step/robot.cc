@@ -276,8 +276,7 @@ void Robot::delassus(std::span<const int> bodies, std::span<const Vector3> point
     check("delassus: points[" + std::to_string(i) + "]", points[i], 3);
     dynamics::ContactRows<double> rows{0, path.data(), joint.data(), {}};
     const Vec3<double> p = Vec3<double>{points[i][0], points[i][1], points[i][2]} - base;
-    dynamics::compute_contact_rows(t, d.memory.layout().link_of_body[bodies[i]], p,
-                                   Mat3<double>{{1, 0, 0, 0, 1, 0, 0, 0, 1}}, rows);
+    dynamics::compute_contact_rows(t, d.memory.layout().link_of_body[bodies[i]], p, rows);
     const auto put = [&](size_t column, const Row3<double>& value) {
       double v[3];
       store(value, v);

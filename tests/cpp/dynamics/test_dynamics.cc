@@ -54,9 +54,9 @@ std::vector<S> run_kernels(const Model& model, const std::vector<std::vector<dou
   std::vector<Row3<S>> rows(memory.max_depth() + 1);
   for (const LinkIndex& link : memory.layout().link_of_body) {
     ContactRows<S> r{0, path.data(), rows.data(), {}};
-    const S half = constant<S>(0.5), o = constant<S>(0), one = constant<S>(1);
+    const S half = constant<S>(0.5), o = constant<S>(0);
     const Vec3<S> point = point_position(t, link, Vec3<S>{half, o, half});
-    compute_contact_rows(t, link, point, Mat3<S>{{one, o, o, o, one, o, o, o, one}}, r);
+    compute_contact_rows(t, link, point, r);
     for (int k = 0; k < r.depth + 6; ++k) {
       S row[3];
       store(k < r.depth ? r.joint[k] : r.base[k - r.depth], row);
