@@ -28,6 +28,7 @@ void step_semi_implicit(RobotData& robot, const StepContext& context) {
   const double dt = context.time_step, *q = s.q.data(), *u = s.u.data();
   const int offset = robot.offset(), joints = robot.num_joints();
   robot.info = StepInfo{};
+  robot.backup.impulse = s.impulse;
 
   // Kinematics, bias and factor; x = L^-T dt (tau - h), the free velocity change in L-space.
   dynamics::compute_positions(t, robot.base_quaternion(q), robot.joints(q));
@@ -68,11 +69,15 @@ void step_semi_implicit(RobotData& robot, const StepContext& context) {
   for (int k = 0; k < offset; ++k) next[k] = u[k] + base[k];
   for (int j = offset; j < offset + joints; ++j) next[j] += u[j];
   for (int k = 0; k < offset + joints; ++k) sum += std::fabs(next[k]);
+  robot.q_new = s.q;
+  integrate_configuration(robot, robot.q_new.data(), next, dt);
+  for (const double x : robot.q_new) sum += std::fabs(x);
   if (!std::isfinite(sum)) {
+    s.impulse = robot.backup.impulse;
     robot.info.status = StepStatus::kNonFinite;
     return;
   }
-  integrate_configuration(robot, s.q.data(), next, dt);
+  s.q = robot.q_new;
   std::copy(next, next + offset + joints, s.u.begin());
   s.time += dt;
   timer.end(&StageTimes::integrate);

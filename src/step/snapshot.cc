@@ -96,7 +96,9 @@ Snapshot read_snapshot(std::span<const std::uint8_t> blob,
     r.numbers(s.drift_acceleration, shape->drift_acceleration.size());
     s.time = r.number();
     s.pending_gravity = r.number();
-    s.fresh = r.count() != 0;
+    const std::uint64_t fresh = r.count();
+    if (fresh > 1) throw ModelError("load_state: these bytes are not a saved state");
+    s.fresh = fresh == 1;
     out.robots.push_back(std::move(s));
   }
   if (!r.done()) throw ModelError("load_state: bytes are left over after the state");

@@ -105,7 +105,8 @@ TEST(ABouncingBallNeverRisesAboveItsStart) {
 
 // ---- overlap
 
-TEST(AnOverlappingBallIsLiftedInOneStepAndGetsNoSpeed) {
+TEST(AnOverlappingBallIsLiftedInOneStepAndGetsNoSpeedWorthTheName) {
+  // At most what closes 0.1 um in a step (docs/design/007-contact-points-on-the-plane.md).
   for (const double depth : {1e-6, 1e-3, 3e-2}) {
     World world(options(1e-3));
     world.add_ground();
@@ -113,7 +114,7 @@ TEST(AnOverlappingBallIsLiftedInOneStepAndGetsNoSpeed) {
     robot.set_state(base_at(robot.model(), {0, 0, 0.1 - depth}), std::vector<double>(6, 0.0));
     world.step();
     CHECK_NEAR(robot.q()[2], 0.1, 2e-9);
-    CHECK_NEAR(largest(robot.u()), 0, 1e-12);
+    CHECK_NEAR(largest(robot.u()), 0, 1.000001e-7 / 1e-3);
     world.step(100);
     CHECK_NEAR(largest(robot.u()), 0, 1e-9);
   }
