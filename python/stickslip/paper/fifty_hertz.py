@@ -89,7 +89,7 @@ def draw(data: dict, folder) -> list:
             color = METHODS["bisection" if integrator == "semi_implicit" else integrator].color
             axis.plot(
                 milliseconds,
-                [max(v, 1e-13) for v in values] if logarithmic else values,
+                [max(v, 1e-9) for v in values] if logarithmic else values,
                 "o-",
                 color=color,
                 label=label,

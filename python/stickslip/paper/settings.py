@@ -14,7 +14,7 @@ class Settings:
     slip_max_steps: int = 200_000  #: and how long to look for them
     single_rounds: int = 7  #: timings of each method in Table I; the median counts
     timed_steps: int = 20_000  #: per task and method for Table II
-    timed_rounds: int = 3
+    timed_rounds: int = 5
     recorded_steps: int = 20_000  #: per task and method for Fig. 4 and the sweeps of Table II
     profiled_steps: int = 10_000  #: per task and method for Fig. 5
     law_steps: int = 20_000  #: per task for Fig. 6, of which every

@@ -24,7 +24,7 @@ _TIMES = {
 }
 _VIEWS = {
     "trot": {"distance": 2.55, "look_up": 0.36},
-    "hang": {"distance": 4.4, "look_up": 0.30, "elevation": 6, "floor_opacity": 0.45},
+    "hang": {"distance": 4.2, "look_up": 0.30, "elevation": 6, "floor_opacity": 0.32},
     "drop": {"distance": 3.15, "look_up": 0.52},
     "random": {"distance": 2.9, "look_up": 0.42},
 }

@@ -1,0 +1,29 @@
+"""What README.md shows runs, and what it links to is there."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_example_runs(capsys):
+    (example,) = re.findall(r"```python\n(.*?)```", TEXT, flags=re.S)
+    exec(compile(example, "README.md", "exec"), {})
+    printed = capsys.readouterr().out.splitlines()
+    assert len(printed) == 5 and all("FOOT" in line for line in printed[:4])
+    assert float(printed[-1].split()[0]) < 1e-8
+
+
+@pytest.mark.parametrize("target", re.findall(r"\]\((?!https?:)([^)#]+)", TEXT))
+def test_linked_file_is_there(target):
+    assert (ROOT / target).is_file()
+
+
+def test_pictures_are_small():
+    for picture in (ROOT / "docs" / "images").iterdir():
+        assert picture.stat().st_size < 300_000, picture.name
