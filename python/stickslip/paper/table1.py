@@ -45,7 +45,6 @@ def measure(settings: Settings, tick) -> dict:
         tasks[task] = {
             "samples": len(mu),
             **found,
-            "off_diagonal": float(_coupling(G)) if len(mu) else None,
             "methods": methods,
         }
         tick(1)
@@ -67,13 +66,6 @@ def _sample(task: str, settings: Settings) -> tuple:
 
 def _slipping(scene, wanted: int, max_steps: int) -> tuple:
     return scene._task.sample_slipping(scene.world._core, scene.robot._core, wanted, max_steps)
-
-
-def _coupling(G: np.ndarray) -> float:
-    """Median of the largest off-diagonal entry over the largest diagonal one."""
-    diagonal = np.abs(np.einsum("kii->ki", G)).max(axis=1)
-    off = np.abs(G[:, [0, 0, 1], [1, 2, 2]]).max(axis=1)
-    return float(np.median(off / diagonal))
 
 
 def draw(data: dict, folder) -> list:
