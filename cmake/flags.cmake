@@ -3,6 +3,10 @@ add_library(stickslip_flags INTERFACE)
 target_include_directories(stickslip_flags INTERFACE ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR}/src)
 # No implicit contraction: the compiler may not choose where a fused multiply-add goes, or the bits would depend on it.
 target_compile_options(stickslip_flags INTERFACE -Wall -Wextra -Wno-psabi -ffp-contract=off -fno-math-errno)
+if(CMAKE_CXX_COMPILER_ID MATCHES "Clang")
+  # Masks of kernels are combined with & and |, also where a mask is a bool.
+  target_compile_options(stickslip_flags INTERFACE -Wno-bitwise-instead-of-logical)
+endif()
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   # AVX2 + FMA (2013) is the minimum: madd() must be one instruction.
   target_compile_options(stickslip_flags INTERFACE -march=x86-64-v3)

@@ -33,7 +33,6 @@ ContactStage::ContactStage(const Model& model, const dynamics::TreeLayout& layou
       placed_(shapes_.size()),
       laws_(shapes_.size()),
       num_points_(collide::total_points(shapes_)),
-      max_depth_(max_depth),
       num_dofs_(layout.num_joints + 6),
       floating_(layout.floating),
       active_(num_points_),

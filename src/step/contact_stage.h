@@ -93,7 +93,7 @@ class ContactStage {
   std::vector<collide::GroundShape> shapes_;
   std::vector<collide::PlacedShape> placed_;
   std::vector<MaterialPair> laws_;
-  int num_points_, max_depth_, num_dofs_;
+  int num_points_, num_dofs_;
   bool floating_;
   std::vector<ActiveContact> active_;
   int count_ = 0;

@@ -14,25 +14,29 @@ namespace {
 
 using dynamics::LinkIndex;
 
-void check(const std::string& what, std::span<const double> values, size_t size) {
+// Names are put together for errors only: setters are called every step and may not allocate.
+void check(const std::string& owner, const char* what, std::span<const double> values,
+           size_t size) {
   if (values.size() != size)
-    throw ModelError(what + ": expected " + std::to_string(size) + " numbers, got " +
+    throw ModelError(owner + what + ": expected " + std::to_string(size) + " numbers, got " +
                      std::to_string(values.size()));
   for (size_t k = 0; k < size; ++k)
     if (!std::isfinite(values[k]))
-      throw ModelError(what + "[" + std::to_string(k) + "] is not finite");
+      throw ModelError(owner + what + "[" + std::to_string(k) + "] is not finite");
 }
 
-void check_gains(const std::string& what, std::span<const double> values, size_t size) {
-  check(what, values, size);
+void check_gains(const std::string& owner, const char* what, std::span<const double> values,
+                 size_t size) {
+  check(owner, what, values, size);
   for (size_t k = 0; k < size; ++k)
     if (values[k] < 0)
-      throw ModelError(what + "[" + std::to_string(k) + "] is negative; gains must be >= 0");
+      throw ModelError(owner + what + "[" + std::to_string(k) +
+                       "] is negative; gains must be >= 0");
 }
 
-void check_output(const std::string& what, std::span<double> out, size_t size) {
+void check_output(const char* what, std::span<double> out, size_t size) {
   if (out.size() != size)
-    throw ModelError(what + ": the output needs room for " + std::to_string(size) +
+    throw ModelError(std::string(what) + ": the output needs room for " + std::to_string(size) +
                      " numbers, has " + std::to_string(out.size()));
 }
 
@@ -73,8 +77,8 @@ std::span<const double> Robot::pd_target() const { return impl_->data.control.ta
 
 void Robot::set_state(std::span<const double> q, std::span<const double> u) {
   step::RobotData& d = impl_->data;
-  check(d.name + ".q", q, d.state.q.size());
-  check(d.name + ".u", u, d.state.u.size());
+  check(d.name, ".q", q, d.state.q.size());
+  check(d.name, ".u", u, d.state.u.size());
   double norm = 1;
   if (d.floating()) {
     norm = std::sqrt(q[3] * q[3] + q[4] * q[4] + q[5] * q[5] + q[6] * q[6]);
@@ -97,15 +101,15 @@ void Robot::set_state(std::span<const double> q, std::span<const double> u) {
 
 void Robot::set_generalized_force(std::span<const double> tau) {
   step::RobotControl& c = impl_->data.control;
-  check(name() + ".generalized_force", tau, c.generalized_force.size());
+  check(name(), ".generalized_force", tau, c.generalized_force.size());
   std::copy(tau.begin(), tau.end(), c.generalized_force.begin());
   c.force = any_nonzero(tau);
 }
 
 void Robot::set_pd_gains(std::span<const double> kp, std::span<const double> kd) {
   step::RobotControl& c = impl_->data.control;
-  check_gains(name() + ".kp", kp, c.kp.size());
-  check_gains(name() + ".kd", kd, c.kd.size());
+  check_gains(name(), ".kp", kp, c.kp.size());
+  check_gains(name(), ".kd", kd, c.kd.size());
   if (std::equal(kp.begin(), kp.end(), c.kp.begin()) &&
       std::equal(kd.begin(), kd.end(), c.kd.begin()))
     return;
@@ -117,7 +121,7 @@ void Robot::set_pd_gains(std::span<const double> kp, std::span<const double> kd)
 
 void Robot::set_pd_target(std::span<const double> target) {
   step::RobotControl& c = impl_->data.control;
-  check(name() + ".pd_target", target, c.target.size());
+  check(name(), ".pd_target", target, c.target.size());
   std::copy(target.begin(), target.end(), c.target.begin());
 }
 
@@ -142,7 +146,7 @@ void Robot::bias_force(std::span<double> out) const {
 
 void Robot::forward_dynamics(std::span<const double> tau, std::span<double> out) const {
   step::RobotData& d = impl_->data;
-  check("tau", tau, d.state.u.size());
+  check("", "tau", tau, d.state.u.size());
   check_output("forward_dynamics", out, d.state.u.size());
   dynamics::Tree<double>& t = impl_->tree_at_state(false);
   const double* u = d.state.u.data();
@@ -273,7 +277,7 @@ void Robot::delassus(std::span<const int> bodies, std::span<const Vector3> point
     if (bodies[i] < 0 || bodies[i] >= static_cast<int>(model().bodies().size()))
       throw ModelError("delassus: bodies[" + std::to_string(i) +
                        "] = " + std::to_string(bodies[i]) + " is not a body of " + name());
-    check("delassus: points[" + std::to_string(i) + "]", points[i], 3);
+    check("delassus: points[" + std::to_string(i) + "]", "", points[i], 3);
     dynamics::ContactRows<double> rows{0, path.data(), joint.data(), {}};
     const Vec3<double> p = Vec3<double>{points[i][0], points[i][1], points[i][2]} - base;
     dynamics::compute_contact_rows(t, d.memory.layout().link_of_body[bodies[i]], p, rows);
