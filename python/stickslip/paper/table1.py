@@ -131,7 +131,7 @@ def _sentences(tasks: dict, mean: dict) -> list[str]:
             f"Too few feet slide in {listed(topped)}: the rest was taken on a floor with friction {_SLIPPERY} in place of 0.8."
         )
     out.append(
-        f"Bisection is {times(max(golden, 1 / golden))} as {'fast' if golden > 1 else 'slow'} as golden section (paper: "
+        f"Bisection is {times(max(golden, 1 / golden))} as {'fast' if golden > 1 else 'slow'} as golden section, {spread(ratio['golden_section'])} over the tasks (paper: "
         f"{number(theirs['golden_section'], 2)} times as fast) and the quartic takes {times(quartic)} as long as bisection "
         f"(paper: {number(theirs['quartic'], 2)}); the order of the paper's three methods is "
         + (
@@ -174,7 +174,7 @@ def _sentences(tasks: dict, mean: dict) -> list[str]:
     out.append(
         f"What differs: the processor (the paper's is an {published.PROCESSOR}). Algorithm 1 as printed cannot run: the "
         "line-of-sight test in its line 13 has the wrong sign, and as printed it turns back every point it should accept; "
-        "ours has the sign corrected, a bracket that cannot be lost and an end to every loop. The paper saw its bisection converge in two steps in most cases; it does not print "
+        "ours has the sign corrected, restores what a rejected step changed, and ends every loop. The paper saw its bisection converge in two steps in most cases; it does not print "
         f"its step sizes β, and ours takes {spread([d['methods']['bisection']['evaluations'] for d in tasks.values()])} evaluations to halve down to the tolerance. "
         "The samples differ too: the paper does not say that its samples slide, and our ANYmal is model B, not the first one. "
         + faster
