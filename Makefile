@@ -47,6 +47,7 @@ $(VENV)/tools: pyproject.toml
 	@command -v $${CXX:-c++} >/dev/null || command -v g++ >/dev/null || \
 	  { echo "A C++20 compiler is needed (GCC >= 12 or Clang >= 16); set CXX to yours."; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install -q --upgrade 'pip>=23.1'  # -C needs it; distributions ship older ones
 	$(BIN)/python -c 'import ast, re; print(*ast.literal_eval(re.search(r"requires = (\[.*?\n\])", open("pyproject.toml").read(), re.S)[1]), sep="\n")' > $@.txt
 	$(BIN)/python -m pip install -q -r $@.txt 'cmake>=3.24' ninja
 	touch $@

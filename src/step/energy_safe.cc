@@ -81,8 +81,7 @@ class EnergySafeStep {
   void start(double h) {
     dynamics::compute_positions(t_, robot_.base_quaternion(q()), robot_.joints(q()));
     dynamics::compute_inertias(t_);
-    factor(h);
-    if (!offset_) gravity_acceleration();
+    refactor(h);
     if (!robot_.state.fresh) return;
     robot_.state.fresh = false;
     dynamics::compute_velocities(t_, robot_.angular(u()), u() + offset_);
@@ -94,6 +93,12 @@ class EnergySafeStep {
   void factor(double h) {
     dynamics::factor_mass_matrix(t_, implicit_diagonal(robot_, h));
     robot_.prepared_step = h;
+  }
+
+  /// The same q with another implicit diagonal.
+  void refactor(double h) {
+    factor(h);
+    if (!offset_) gravity_acceleration();
   }
 
   /// Fixed base: accelerations by gravity alone, at q.
@@ -127,7 +132,7 @@ class EnergySafeStep {
   /// it is not finite.
   double kick(double left, double shortest) {
     for (double h = left;;) {
-      if (implicit_diagonal(robot_, h) && robot_.prepared_step != h) factor(h);
+      if (implicit_diagonal(robot_, h) && robot_.prepared_step != h) refactor(h);
       free_motion(h);
       contacts(h);
       const double turn = h * fastest_turn(robot_.u_plus.data());
