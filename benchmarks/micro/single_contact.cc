@@ -2,8 +2,8 @@
 // (slips only).
 #include <cstdio>
 
-#include "benchmarks/micro/time_methods.h"
 #include "scenes/contact_families.h"
+#include "scenes/time_methods.h"
 
 using namespace stickslip;
 using contact::Method;
@@ -21,12 +21,12 @@ int main() {
       G.insert(G.end(), p.G.begin(), p.G.end()), c.insert(c.end(), p.c.begin(), p.c.end());
       mu.push_back(p.mu);
     }
-    auto contacts = benchmarks::prepare_contacts(G.data(), c.data(), mu.data(), mu.size());
+    auto contacts = scenes::prepare_contacts(G.data(), c.data(), mu.data(), mu.size());
     for (const bool max_dissipation : {true, false})
       for (const double tolerance : {1e-6, 1e-10}) {
         std::vector<Method> methods{Method::kHalley, Method::kBisection, Method::kQuartic};
         if (max_dissipation) methods.push_back(Method::kGoldenSection);
-        const auto times = benchmarks::time_methods(contacts, methods, max_dissipation, tolerance);
+        const auto times = scenes::time_methods(contacts, methods, max_dissipation, tolerance);
         for (std::size_t m = 0; m < methods.size(); ++m)
           std::printf("%-16s %-16s %-8.0e %-15s %9.1f %8.2f %8.3f%%\n", scenes::family_name(family),
                       max_dissipation ? "max_dissipation" : "coulomb", tolerance,

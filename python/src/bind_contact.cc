@@ -5,8 +5,8 @@
 #include <stickslip/contact.h>
 #include <stickslip/errors.h>
 
-#include "benchmarks/micro/time_methods.h"
 #include "bindings.h"
+#include "scenes/time_methods.h"
 #include "words.h"
 
 namespace nb = nanobind;
@@ -114,12 +114,12 @@ nb::list time_single_contact(const VectorIn& delassus, const VectorIn& free_velo
   if (n == 0 || delassus.size() != 9 * n || free_velocity.size() != 3 * n)
     throw ModelError("time_single_contact: shapes (k, 3, 3), (k, 3) and (k,) with k > 0 wanted");
   if (rounds < 1) throw ModelError("time_single_contact: rounds must be at least 1");
-  std::vector<benchmarks::MethodTime> times;
+  std::vector<scenes::MethodTime> times;
   {
     nb::gil_scoped_release free_interpreter;
     auto contacts =
-        benchmarks::prepare_contacts(delassus.data(), free_velocity.data(), friction.data(), n);
-    times = benchmarks::time_methods(contacts, kernels, max_dissipation, tolerance, rounds);
+        scenes::prepare_contacts(delassus.data(), free_velocity.data(), friction.data(), n);
+    times = scenes::time_methods(contacts, kernels, max_dissipation, tolerance, rounds);
   }
   nb::list out;
   for (const auto& t : times) out.append(nb::make_tuple(t.ns_per_solve, t.evaluations, t.failures));

@@ -10,7 +10,7 @@
 #include "contact/residual.h"
 #include "contact/single.h"
 
-namespace stickslip::benchmarks {
+namespace stickslip::scenes {
 
 /// One method's figures over all contacts.
 struct MethodTime {
@@ -129,4 +129,4 @@ inline std::vector<MethodTime> time_methods(TimedContacts& t,
   return out;
 }
 
-}  // namespace stickslip::benchmarks
+}  // namespace stickslip::scenes
