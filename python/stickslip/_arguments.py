@@ -19,13 +19,19 @@ def number(name: str, value: Any) -> float:
     return result
 
 
+LARGEST_COUNT = 2**31 - 1  # the core counts in 32 bits
+
+
 def count(name: str, value: Any) -> int:
-    """An integer, zero or positive."""
+    """An integer, zero or positive, that the core can hold."""
     if isinstance(value, (bool, np.bool_)) or not hasattr(value, "__index__"):
         raise TypeError(f"{name} is {value!r}; an integer is wanted")
-    if value.__index__() < 0:
+    result = value.__index__()
+    if result < 0:
         raise ValueError(f"{name} is {value}; it must be zero or positive")
-    return value.__index__()
+    if result > LARGEST_COUNT:
+        raise ValueError(f"{name} is {value}; it must be at most {LARGEST_COUNT}")
+    return result
 
 
 def array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:

@@ -5,11 +5,9 @@ A world and its robots belong to one thread at a time; different worlds can step
 
 from __future__ import annotations
 
-import enum
 import os
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,22 +16,11 @@ from stickslip import _core
 from stickslip._arguments import array, count, number
 from stickslip._core import Model, Pose, load_urdf
 from stickslip.contact import ContactProblem
+from stickslip.reports import Contact, SolveInfo, StageTimes, StepStatus
 
 __all__ = ["Contact", "Robot", "SolveInfo", "StageTimes", "StepError", "StepStatus", "World"]
 
 Array = NDArray[np.float64]
-
-
-class StepStatus(enum.IntFlag):
-    """What a step reports; bits, or-ed over the robots."""
-
-    OK = 0
-    NOT_CONVERGED = 1
-    """Cause: a contact solve stayed above its tolerance. Consequence: the best impulse found was used, see the residual in
-    `solve_info`. Remedy: a smaller step."""
-    NON_FINITE = 2
-    """Cause: forces or velocities overflowed. Consequence: the robot was left in its last finite state; Python raises
-    StepError. Remedy: a smaller step, smaller forces or gains."""
 
 
 class StepError(FloatingPointError):
@@ -42,46 +29,6 @@ class StepError(FloatingPointError):
     def __init__(self, message: str, robots: list[str]):
         super().__init__(message)
         self.robots = robots
-
-
-@dataclass(frozen=True)
-class Contact:
-    """One contact point of the last step (of its last substep, where there were several)."""
-
-    robot: str  #: name of the robot
-    body: str  #: name of its body
-    shape: str  #: name of its shape: the URDF link and the shape's index there, as in "LF_FOOT/0"
-    point: int  #: of the shape; a box has 8 corners
-    position: Array  #: (3,) world [m], at the start of the step
-    normal: Array  #: (3,) world, from the ground to the robot [1]
-    gap: float  #: at the start of the step [m], negative where they overlap
-    friction: float  #: Coulomb's coefficient [1]
-    impulse: Array  #: (3,) on the robot, world axes [N s]
-    velocity: Array  #: (3,) after the impulse, world axes [m/s]
-
-
-@dataclass(frozen=True)
-class SolveInfo:
-    """What the last step did: of one robot, or the sums and worst values over a world."""
-
-    status: StepStatus  #: bits
-    contacts: int  #: candidates in the solve; a world: of all robots
-    sweeps: int  #: passes over all contacts; a world: the most of any robot, as are all below
-    newton_steps: int  #: of the solver's finish and fallback
-    substeps: int  #: parts the step was cut into ("energy_safe")
-    residual: float  #: largest contact residual [m/s]
-
-
-@dataclass(frozen=True)
-class StageTimes:
-    """Seconds per stage since `World.reset_stage_times`, counted while `World.set_profiling(True)`."""
-
-    dynamics: float  #: kinematics, bias force, mass matrix factor, free velocity [s]
-    detection: float  #: candidates and gaps [s]
-    delassus: float  #: rows of the contact problem [s]
-    solve: float  #: contact impulses [s]
-    integrate: float  #: final velocity, drift, position correction [s]
-    steps: int  #: time steps counted
 
 
 def _read_only(values: Array) -> Array:
@@ -294,7 +241,10 @@ class Robot:
         return SolveInfo(StepStatus(i.status), i.contacts, i.sweeps, i.newton_steps, i.substeps, i.residual)
 
     def next_contact_problem(self) -> ContactProblem:
-        """The contact problem that the next step would solve, for `stickslip.solve`; empty without contacts."""
+        """The contact problem that the next step would solve (its last substep), for `stickslip.solve`; empty without contacts.
+
+        Forgets the `contacts` of the last step.
+        """
         index = self._world.robots.index(self)
         return ContactProblem(*self._world._core.next_contact_problem(index))
 
@@ -309,7 +259,10 @@ class World:
     method: how contact impulses are found, "auto", "per_contact" ([Hwangbo 2018] Algorithm 2) or "pgs".
     law: "coulomb" (friction opposite to sliding) or "max_dissipation" ([Hwangbo 2018] eq. 8).
     single_contact: "halley", "bisection", "golden_section" or "quartic"; for "per_contact".
-    tolerance: on the largest contact residual [m/s]; relative_tolerance: part of the largest contact speed, "auto" only.
+    tolerance: where the contact solve stops. "auto": the change of the contact velocities in a sweep [m/s], added to
+        relative_tolerance times the largest contact speed, at most 1e-8; it has converged when the largest contact residual
+        is at most 1e-8 m/s. "per_contact": the paper's sum of what each contact violates of its law [m/s]. "pgs": the paper's sum of
+        impulse updates [N s] and penetration velocities [m/s].
     max_sweeps, alpha, alpha_min, gamma: of "per_contact" (and alpha of "pgs"), as in `stickslip.solve`.
     warm_start: start each solve at the last step's impulses.
     max_substeps: "energy_safe" cuts a step into at most this many parts when bodies turn fast.
