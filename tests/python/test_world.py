@@ -60,6 +60,7 @@ def test_default_world_has_the_documented_options() -> None:
         ({"single_contact": "guess"}, "'halley', 'bisection', 'golden_section', 'quartic'"),
         ({"tolerance": -1.0}, "tolerance"),
         ({"max_sweeps": -1}, "max_sweeps"),
+        ({"max_sweeps": 2**40}, "max_sweeps is 1099511627776; it must be at most"),
         ({"alpha": float("nan")}, "alpha"),
         ({"max_substeps": 0}, "max_substeps"),
     ],
@@ -347,7 +348,7 @@ def test_state_of_other_robots_is_refused(ball: ss.Model, flail: ss.Model) -> No
         one.load_state(two.save_state())
 
 
-@pytest.mark.parametrize(("steps", "error"), [(-1, ValueError), (1.5, TypeError), ("2", TypeError)])
+@pytest.mark.parametrize(("steps", "error"), [(-1, ValueError), (2**31, ValueError), (1.5, TypeError), ("2", TypeError)])
 def test_steps_are_counted_in_whole_numbers(ball: ss.Model, steps, error: type) -> None:
     world, _ = resting_ball(ball)
     with pytest.raises(error, match="steps"):
