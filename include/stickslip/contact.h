@@ -119,7 +119,8 @@ struct SingleContactOptions {
 struct SingleContactResult {
   double impulse[3];      ///< x, y, z (normal) [N s]
   int evaluations = 0;    ///< of the gradient or energy; 0 when open or sticking
-  bool converged = true;  ///< false: the method failed; the impulse is the best point it saw
+  bool converged = true;  ///< false: the method failed, or no finite impulse solves the contact
+                          ///< (it jams); the impulse is the best point seen, always finite
 };
 
 /// Solves one contact: `delassus` row-major 3x3 [1/kg], `free_velocity` (3) [m/s], `friction`

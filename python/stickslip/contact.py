@@ -163,7 +163,8 @@ def solve_contact(
     """(3,) [N s]: the impulse of a single contact, delassus (3, 3) [1/kg], free_velocity (3,) [m/s], friction >= 0.
 
     tolerance: "halley": residual velocity over |free_velocity|; the others: impulse interval [N s].
-    Raises ArithmeticError where the method fails, which "halley" and "bisection" do not.
+    Raises ArithmeticError where the method fails, which "halley" and "bisection" do not, and where no finite impulse solves the
+    contact (delassus singular, a large friction: it jams).
     """
     G = _shaped("delassus", delassus, (3, 3))
     c = _shaped("free_velocity", free_velocity, (3,))

@@ -31,10 +31,6 @@ struct ExplicitProblem {
   const double* row(int r) const { return G + static_cast<long>(r) * 3 * n; }
 };
 
-/// Friction above this counts as this: beyond, the rounding of v_T times mu would fill the
-/// residual.
-inline constexpr double kMaxFriction = 1e4;
-
 /// v = G lambda + c from scratch.
 inline void refresh_velocity(ExplicitProblem& p) {
   const int m = 3 * p.n;

@@ -23,6 +23,10 @@ struct LocalContact {
   S scale;                   // trace(G_ii) / 3 = 1 / rho_i [1/kg]: turns impulses into velocities
 };
 
+/// Friction above this counts as this: beyond, the rounding of v_T times mu would fill the
+/// residual.
+inline constexpr double kMaxFriction = 1e4;
+
 /// Relative size below which an eigenvalue of a block counts as zero.
 template <class S>
 STICKSLIP_INLINE constexpr double singular_threshold() {
@@ -46,9 +50,10 @@ STICKSLIP_INLINE void prepare(LocalContact<S>& k) {
   k.sxy = nmadd(k.xz, k.wy, k.xy);
   k.syy = nmadd(k.yz, k.wy, k.yy);
   const S det = nmadd(k.sxy, k.sxy, k.sxx * k.syy), tr = k.sxx + k.syy;
-  // The rounding of S is relative to G_TT, not to S.
-  const auto full = det > eps * tr * (k.xx + k.yy);
+  // The rounding of S is relative to G_TT, not to S. Where S vanishes, it leaves a trace of either
+  // sign, so a determinant counts only next to a trace.
   const auto some = tr > eps * trace;
+  const auto full = some & (det > eps * tr * (k.xx + k.yy));
   const S inv = select(full, one / select(full, det, one), one / select(some, tr * tr, one));
   const S inverse = select(full | some, inv, zero);
   k.ixx = select(full, k.syy, k.sxx) * inverse;

@@ -15,8 +15,9 @@ enum class Method { kHalley, kBisection, kGoldenSection, kQuartic };
 
 /// S has rank below two, as `prepare` sees it.
 STICKSLIP_INLINE bool is_singular(const LocalContact<double>& k) {
+  const double eps = singular_threshold<double>(), tr = k.sxx + k.syy;
   const double det = nmadd(k.sxy, k.sxy, k.sxx * k.syy);
-  return !(det > singular_threshold<double>() * (k.sxx + k.syy) * (k.xx + k.yy));
+  return !(tr > eps * (k.xx + k.yy + k.zz) && det > eps * tr * (k.xx + k.yy));
 }
 
 /// The contact with S + 1e-11 trace(G) in place of S: a velocity error of 1e-11 |c|. A contact on a
@@ -39,25 +40,10 @@ STICKSLIP_INLINE bool must_slide(const LocalContact<double>& k, const Reduced<do
   return (r.stick || r.slip) && vx * vx + vy * vy > 1e-20 * speed2;
 }
 
-/// The impulse [N s] of one contact whose velocity without it is c [m/s]. `evaluations` is 0 when
-/// it opens or sticks. Tolerance: kHalley: residual velocity [m/s]; the others: impulse interval
-/// [N s].
+/// A slipping contact with mu > 0 by the chosen method.
 template <Method method, bool kMaxDissipation>
-STICKSLIP_INLINE SlipSolution solve_single(const LocalContact<double>& given, const double c[3],
-                                           double tolerance) {
-  LocalContact<double> rail;
-  const LocalContact<double>* used = &given;
-  Reduced<double> r = reduce(given, c[0], c[1], c[2]);
-  if (is_singular(given) && must_slide(given, r, c)) [[unlikely]] {
-    rail = regularized(given);
-    const Reduced<double> far = reduce(rail, c[0], c[1], c[2]);
-    // Sticking by an impulse of 1e11 is jamming: no finite impulse solves it.
-    if (far.slip) used = &rail, r = far;
-  }
-  const LocalContact<double>& k = *used;
-  if (r.stick) return {r.x, r.y, r.z, 0, true};
-  if (!r.slip) return {0, 0, 0, 0, true};
-  if (!(k.mu > 0)) return {0, 0, r.a, 0, true};
+STICKSLIP_INLINE SlipSolution solve_slipping(const LocalContact<double>& k,
+                                             const Reduced<double>& r, double tolerance) {
   if constexpr (method == Method::kHalley) {
     double lambda[3];
     int evaluations;
@@ -71,6 +57,40 @@ STICKSLIP_INLINE SlipSolution solve_single(const LocalContact<double>& given, co
   } else {
     return solve_quartic<kMaxDissipation>(k, r, tolerance);
   }
+}
+
+/// What is returned where no finite impulse solves the contact, or the method found none: the
+/// frictionless impulse.
+inline SlipSolution frictionless(const Reduced<double>& r, int evaluations) {
+  return {0, 0, r.a - r.a == 0 ? r.a : 0, evaluations, false};
+}
+
+/// The impulse [N s] of one contact whose velocity without it is c [m/s]. `evaluations` is 0 when
+/// it opens or sticks. Tolerance: kHalley: residual velocity [m/s]; the others: impulse interval
+/// [N s]. Always finite.
+template <Method method, bool kMaxDissipation>
+STICKSLIP_INLINE SlipSolution solve_single(const LocalContact<double>& given, const double c[3],
+                                           double tolerance) {
+  LocalContact<double> rail;
+  const LocalContact<double>* used = &given;
+  Reduced<double> r = reduce(given, c[0], c[1], c[2]);
+  if (is_singular(given) && must_slide(given, r, c)) [[unlikely]] {
+    rail = regularized(given);
+    const Reduced<double> far = reduce(rail, c[0], c[1], c[2]);
+    // Sticking by an impulse of 1e11 is jamming: no finite impulse solves it.
+    if (!far.slip && given.mu > 0) return frictionless(r, 0);
+    if (far.slip) used = &rail, r = far;
+  }
+  const LocalContact<double>& k = *used;
+  if (!(r.stick || r.slip)) return {0, 0, 0, 0, true};
+  SlipSolution s = {r.x, r.y, r.z, 0, true};
+  if (!r.stick)
+    s = k.mu > 0 ? solve_slipping<method, kMaxDissipation>(k, r, tolerance)
+                 : SlipSolution{0, 0, r.a, 0, true};
+  // Infinity or NaN: x - x is not 0.
+  if (!((s.x - s.x) + (s.y - s.y) + (s.z - s.z) == 0)) [[unlikely]]
+    return frictionless(r, s.evaluations);
+  return s;
 }
 
 /// Calls f with the method and the law as compile-time constants: f(MethodTag<m>, LawTag<l>).

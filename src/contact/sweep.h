@@ -108,7 +108,7 @@ STICKSLIP_STAGE void prepare_contact(FactoredContact<S>& c) {
   const S* p = c.private_block;
   k.xx = shared[0] + p[0], k.xy = shared[1] + p[1], k.xz = shared[2] + p[2];
   k.yy = shared[3] + p[3], k.yz = shared[4] + p[4], k.zz = shared[5] + p[5];
-  k.mu = c.friction;
+  k.mu = min(c.friction, constant<S>(kMaxFriction));
   prepare(k);
   // G^-1 = [S^-1, -S^-1 w; ., 1/G_zz + w^T S^-1 w]: one product of columns on the latency chain of
   // a sticking visit.

@@ -271,3 +271,72 @@ TEST(QuarticSaysWhenItFails) {
   CHECK(!s.converged);
   CHECK(std::isfinite(s.x) && std::isfinite(s.y) && std::isfinite(s.z));
 }
+
+namespace {
+
+/// One contact on a body with one or two degrees of freedom: G = sum_k t_k t_k^T, c in its range,
+/// `shifted`: plus an allowed approach. Planar: nothing moves along y, so S is 0 up to rounding.
+SingleContact random_rail(scenes::Random& rng, bool planar, int rank, bool shifted, double mu) {
+  SingleContact p{};
+  p.mu = mu;
+  for (int k = 0; k < rank; ++k) {
+    const double t[3] = {rng.normal(), planar ? 0 : rng.normal(), rng.normal()},
+                 along = rng.normal();
+    for (int a = 0; a < 3; ++a) {
+      p.c[a] += t[a] * along;
+      for (int b = 0; b < 3; ++b) p.G[3 * a + b] += t[a] * t[b];
+    }
+  }
+  if (shifted) p.c[2] += rng.normal();
+  return p;
+}
+
+struct RailCounts {
+  long infinite = 0, wrong = 0, failed = 0;
+};
+
+/// Solves by one method and law; a claim of convergence is checked. A failure counts unless the
+/// contact may jam.
+template <Method method, bool kMaxDissipation>
+void check_rail(const SingleContact& p, RailCounts& counts) {
+  const LocalContact<double> k = local(p);
+  const double speed = norm(p.c.data());
+  const auto s =
+      contact::solve_single<method, kMaxDissipation>(k, p.c.data(),
+                                                     method == Method::kHalley ? 1e-10 * speed
+                                                     : method == Method::kGoldenSection ? 1e-6
+                                                                                        : 1e-10);
+  const double l[3] = {s.x, s.y, s.z};
+  double v[3];
+  velocity(p, l, v);
+  counts.infinite += !std::isfinite(norm(l));
+  const double outside = std::fmax(0, std::hypot(s.x, s.y) - p.mu * s.z * (1 + 1e-9)) * k.scale;
+  const double error =
+      kMaxDissipation ? outside + std::fmax(0, -v[2]) : contact::natural_map_residual(k, v, l);
+  counts.wrong += s.converged && !(error <= 1e-7 * speed * (1 + p.mu));
+  counts.failed += !s.converged && p.mu * std::hypot(p.G[2], p.G[5]) < p.G[8];
+}
+
+}  // namespace
+
+TEST(SingularBlocksGiveFiniteImpulsesAndNoFalseClaims) {
+  RailCounts halley, bisection, golden, quartic;
+  for (int kind = 0; kind < 8; ++kind)
+    for (const double mu : {0.0, 0.1, 0.8, 3.0, 1e4}) {
+      scenes::Random rng(60 + kind);
+      for (int i = 0; i < kCount / 10; ++i) {
+        const SingleContact p = random_rail(rng, kind & 1, 1 + (kind >> 1 & 1), kind & 4, mu);
+        check_rail<Method::kHalley, false>(p, halley);
+        check_rail<Method::kHalley, true>(p, halley);
+        check_rail<Method::kBisection, false>(p, bisection);
+        check_rail<Method::kBisection, true>(p, bisection);
+        check_rail<Method::kGoldenSection, true>(p, golden);
+        check_rail<Method::kQuartic, false>(p, quartic);
+        check_rail<Method::kQuartic, true>(p, quartic);
+      }
+    }
+  for (const RailCounts& c : {halley, bisection, golden, quartic})
+    CHECK(c.infinite == 0 && c.wrong == 0);
+  // The two others say that they failed, as they may.
+  CHECK(halley.failed == 0 && bisection.failed == 0);
+}
