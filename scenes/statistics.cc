@@ -7,17 +7,10 @@
 
 namespace stickslip::scenes {
 
-std::optional<double> node_energy(const Robot& robot, const WorldOptions& options) {
-  const double dt = options.time_step;
-  double kick = -dt / 2;  // semi-implicit
-  if (options.integrator == Integrator::kEnergySafe) {
-    bool pushed = false;
-    for (const Contact& c : robot.contacts()) pushed = pushed || dot(c.impulse, c.impulse) > 0;
-    if (pushed && robot.info().substeps > 1) return std::nullopt;
-    kick = pushed ? dt / 2 : 0;
-  }
+double node_energy(const Robot& robot, const WorldOptions& options) {
+  if (options.integrator == Integrator::kEnergySafe) return robot.mechanical_energy();
   // T(u + g kick) = T(u) + p . g kick + m |g kick|^2 / 2
-  const Vector3 change = kick * options.gravity;
+  const Vector3 change = -options.time_step / 2 * options.gravity;
   return robot.kinetic_energy() + dot(robot.linear_momentum(), change) +
          robot.model().mass() * dot(change, change) / 2 + robot.potential_energy();
 }
@@ -53,21 +46,24 @@ void Statistics::observe(const Robot& robot) {
     ++exploded;
   }
 
+  bool pushed[kNumLegs] = {};
+  for (const Contact& c : robot.contacts())
+    if (c.body > 0 && c.impulse[2] > 0) pushed[(c.body - 1) / 3] = true;
+
   for (int l = 0; l < kNumLegs; ++l) {
     const double depth = kFootRadius - q[2] - leg_state(l, q, u).foot[2];
     max_landing_penetration = std::max(max_landing_penetration, depth);
     if (time_ <= settle_) continue;
     max_penetration = std::max(max_penetration, depth);
-    if (depth < -1e-4) continue;
+    if (!(depth > 0) && !pushed[l]) continue;
     penetration_sum_ += std::max(depth, 0.0);
     ++penetration_count_;
   }
 
   if (track_energy_) {
-    if (const std::optional<double> energy = node_energy(robot, options_)) {
-      max_energy_growth = std::max(max_energy_growth, *energy - lowest_energy_);
-      lowest_energy_ = std::min(lowest_energy_, *energy);
-    }
+    const double energy = node_energy(robot, options_);
+    max_energy_growth = std::max(max_energy_growth, energy - lowest_energy_);
+    lowest_energy_ = std::min(lowest_energy_, energy);
   }
 
   distance += q[0] - x_;

@@ -2,8 +2,6 @@
 #pragma once
 #include <stickslip/world.h>
 
-#include <optional>
-
 #include "scenes/anymal.h"
 
 namespace stickslip::scenes {
@@ -20,7 +18,7 @@ class Statistics {
   void observe(const Robot& robot);
 
   long steps = 0, episodes = 0;
-  double mean_penetration() const;     ///< of feet that touch (gap < 0.1 mm), after settling [m]
+  double mean_penetration() const;     ///< of feet that push or overlap, after settling [m]
   double max_penetration = 0;          ///< after settling [m]
   double max_landing_penetration = 0;  ///< of a whole episode [m]
   double max_velocity = 0;             ///< largest |u_i| [m/s, rad/s]
@@ -44,10 +42,8 @@ class Statistics {
 };
 
 /// Kinetic plus potential energy at the configuration of the last step [J], by the rule under which
-/// a free parabola keeps it exactly. Gravity's kick is staggered: the velocity of the semi-implicit
-/// step is half a kick ahead of its configuration, that of the energy-safe step half a kick behind
-/// while the ground pushes. Empty where that half kick belongs to a substep, whose length is
-/// unknown.
-std::optional<double> node_energy(const Robot& robot, const WorldOptions& options);
+/// a free parabola keeps it exactly: the velocity of the semi-implicit step is half of gravity's
+/// kick ahead of its configuration; the energy-safe step accounts for its own.
+double node_energy(const Robot& robot, const WorldOptions& options);
 
 }  // namespace stickslip::scenes
