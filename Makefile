@@ -17,7 +17,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # A PYTHONPATH or an active environment of the caller must not leak into ours.
 unexport PYTHONPATH PYTHONHOME
 
-CXX_FILES = $(shell find include src scenes python tests benchmarks examples -name '*.h' -o -name '*.cc' -o -name '*.inl')
+CXX_FILES = $(shell find include src scenes python tests benchmarks -name '*.h' -o -name '*.cc' -o -name '*.inl')
 SOURCES := $(shell find include src scenes cmake assets python -type f -not -path '*/__pycache__/*' 2>/dev/null)
 CXX_TESTS := $(shell find tests/cpp -type f 2>/dev/null)
 # One build folder serves the package and the C++ tests, so that nothing is compiled twice.
@@ -65,10 +65,14 @@ $(VENV)/dev: $(VENV)/tools
 	$(BIN)/python -m pip install -q -r $@.txt
 	touch $@
 
-bench: $(VENV)/installed-test
-	$(BIN)/cmake -S . -B $(BUILD) -DSTICKSLIP_BENCHMARKS=ON
-	$(BIN)/cmake --build $(BUILD)
-	$(BUILD)/benchmarks/compare/stickslip_compare $(BENCH)
+# The benchmarks have their own build folder: the package's keeps its options.
+$(VENV)/bench: $(VENV)/tools
+	$(BIN)/python -c 'import ast, re; print(*ast.literal_eval(re.search(r"\nbench = (\[.*?\])", open("pyproject.toml").read(), re.S)[1]), sep="\n")' > $@.txt
+	$(BIN)/python -m pip install -q -r $@.txt
+	touch $@
+
+bench: $(VENV)/bench
+	$(BIN)/python benchmarks/compare/run.py $(BENCH)
 
 # -O1: with checks in every unrolled kernel, -O2 takes minutes and gigabytes per file.
 # Without the longest runs of whole tasks: ten times slower here, and the trot runs the same code.

@@ -49,7 +49,7 @@ if(NOT cmeel_prefix)
   list(REMOVE_DUPLICATES candidates)
   list(JOIN candidates "\n  " candidates)
   message(FATAL_ERROR
-    "urdfdom was not found. Install it with\n  ${Python_EXECUTABLE} -m pip install 'cmeel-urdfdom[build]'\n"
+    "urdfdom was not found. Install it with\n  ${Python_EXECUTABLE} -m pip install 'cmeel-urdfdom[build]>=6,<7'\n"
     "or pass -DPython_EXECUTABLE=<the interpreter that has it> or -DSTICKSLIP_CMEEL_PREFIX=<its cmeel.prefix>. "
     "Looked in:\n  ${candidates}")
 endif()
