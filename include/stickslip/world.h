@@ -206,7 +206,8 @@ class World {
   std::vector<std::uint8_t> save_state() const;
   void load_state(std::span<const std::uint8_t> blob);
 
-  /// The explicit contact problem that the next step of a robot would solve (no contacts: empty).
+  /// The explicit contact problem that the next step of a robot would solve in its last substep (no
+  /// contacts: empty). Forgets the contacts of the last step.
   ContactProblem next_contact_problem(int robot);
   /// The explicit contact problem that the last step of a robot solved (its last substep, where
   /// there were several) and, if asked for, the impulses it found (3n) [N s]. Empty without

@@ -5,7 +5,7 @@
 
 namespace stickslip {
 
-/// sin and cos of x [rad], |x| < 1e5: reduction modulo pi/2 in three parts, then minimax
+/// sin and cos of x [rad], |x| < 1e15: reduction modulo pi/2 in three parts, then minimax
 /// polynomials (fdlibm's for double, Cephes' for float). Error about 1 ulp: 1.1e-16 in double, 9e-8
 /// in float.
 template <class S>

@@ -68,6 +68,7 @@ void ContactStage::add(int shape, int point, const Vec3<double>& position, doubl
   a.position = position;
   a.gap = gap;
   a.shift = 0;
+  a.gravity = zero3<double>();
 }
 
 void ContactStage::detect_within(const Tree<double>& tree, double clearance, double reach) {
@@ -133,11 +134,21 @@ void ContactStage::allow_closing(double h, double tolerance) {
   for (int i = 0; i < count_; ++i) active_[i].shift = std::max(active_[i].gap, -tolerance) / h;
 }
 
-void ContactStage::add_restitution(double kick, double h) {
+void ContactStage::set_gravity(const Vec3<double>& gravity) {
+  for (int i = 0; i < count_; ++i) active_[i].gravity = gravity;
+}
+
+void ContactStage::take_gravity(const Tree<double>& tree) {
+  for (int i = 0; i < count_; ++i)
+    active_[i].gravity =
+        dynamics::point_velocity(tree, shapes_[active_[i].shape].link, active_[i].position);
+}
+
+void ContactStage::add_restitution(double fall, double h) {
   for (int i = 0; i < count_; ++i) {
     ActiveContact& a = active_[i];
     const MaterialPair& law = laws_[a.shape];
-    const double before = a.velocity.z - kick;
+    const double kick = fall * a.gravity.z, before = a.velocity.z - kick;
     // The rebound is kicked like any motion: with e = 1 a ball keeps its energy. Not into the
     // ground.
     if (law.restitution > 0 && -before > law.restitution_threshold && a.gap + h * a.velocity.z < 0)
@@ -262,11 +273,11 @@ bool ContactStage::any_impulse() const {
   return false;
 }
 
-Vec3<double> ContactStage::total_impulse() const {
-  Vec3<double> sum = zero3<double>();
+double ContactStage::work_rate_of_gravity() const {
+  double sum = 0;
   for (int i = 0; i < count_; ++i) {
     const double* l = problem_.contact(i).impulse;
-    sum = sum + Vec3<double>{l[0], l[1], l[2]};
+    sum += dot(Vec3<double>{l[0], l[1], l[2]}, active_[i].gravity);
   }
   return sum;
 }

@@ -23,6 +23,7 @@ struct ActiveContact {
   Vec3<double> position;  // relative to the base origin, world axes
   double gap;             // [m]
   Vec3<double> velocity;  // of the point before the impulse [m/s]
+  Vec3<double> gravity;   // acceleration of the point by gravity alone [m/s^2]
   double shift;  // added to the normal velocity: allowed approach gap / h, less restitution [m/s]
   dynamics::ContactRows<double> rows;
 };
@@ -54,9 +55,13 @@ class ContactStage {
   /// Speculative contacts: a point at `gap` above the ground may approach with gap / h; one that
   /// overlaps is not pushed out faster than tolerance / h.
   void allow_closing(double h, double tolerance);
-  /// Newton's restitution where the gap closes within h. Approach speeds are taken before the kick
-  /// of this step: `kick` is what it added to normal velocities [m/s].
-  void add_restitution(double kick, double h);
+  /// Accelerations of the points by gravity: the same for all (a floating base falls as a whole),
+  /// or from the link velocities, which then hold the acceleration by gravity.
+  void set_gravity(const Vec3<double>& gravity);
+  void take_gravity(const dynamics::Tree<double>& tree);
+  /// Newton's restitution where the gap closes within h. Approach speeds are taken before gravity's
+  /// part of the kick, which lasted `fall` [s].
+  void add_restitution(double fall, double h);
   /// Rows and the factored problem. `with_x`: free velocities come from J u + Y x with the tree's
   /// x; otherwise from J u.
   void build_problem(dynamics::Tree<double>& tree, bool with_x);
@@ -65,7 +70,8 @@ class ContactStage {
   /// Adds Y^T lambda to the tree's x.
   void add_impulses(dynamics::Tree<double>& tree) const;
   bool any_impulse() const;
-  Vec3<double> total_impulse() const;  // [N s]
+  /// sum lambda . (acceleration of the contact point by gravity) [J/s].
+  double work_rate_of_gravity() const;
   /// Energy the impulses gave, sum lambda . (c + G lambda / 2), with c the free velocity before the
   /// shift [J].
   double work() const;

@@ -17,11 +17,11 @@
 namespace stickslip::step {
 namespace {
 
-constexpr double kMaxTurn = 0.25;           // largest rotation of a link in one substep [rad]
+constexpr double kMaxTurn = 0.25;           // largest rotation of base or joint in a substep [rad]
 constexpr double kMaxCorrection = 0.2;      // largest rotation of an overlap correction [rad]
 constexpr double kOverlapTolerance = 1e-7;  // [m]
-constexpr double kDriftLimit =
-    0.5;  // half kick of the drift, as a share of the velocity in the kinetic metric
+// Half kick of the drift, as a share of the velocity in the kinetic metric.
+constexpr double kDriftLimit = 0.5;
 constexpr double kMaxScale = 1.1;  // largest factor of the energy projection
 
 /// Invariants of the drift, taken after the kick at the old configuration.
@@ -131,7 +131,9 @@ class EnergySafeStep {
   /// u_plus after a kick over h <= left, h as long as no link turns too far. Returns h, or 0 where
   /// it is not finite.
   double kick(double left, double shortest) {
+    const StepInfo before = robot_.info;
     for (double h = left;;) {
+      robot_.info = before;  // an attempt that is thrown away leaves no status
       if (implicit_diagonal(robot_, h) && robot_.prepared_step != h) refactor(h);
       free_motion(h);
       contacts(h);
@@ -213,7 +215,8 @@ class EnergySafeStep {
       return;
     }
     c.allow_closing(h, kOverlapTolerance);
-    c.add_restitution(offset_ ? fall_ * context_.gravity.z : 0, h);
+    gravity_at_contacts();
+    c.add_restitution(fall_, h);
     c.build_problem(t_, false);
     timer_.end(&StageTimes::delassus);
     const double worst = robot_.info.residual;
@@ -225,17 +228,25 @@ class EnergySafeStep {
       solve_lower(robot_.u_plus.data());
       // What is left of gravity's kick belongs to the time after the impulses: its work is the
       // weight's, not theirs.
-      const Vec3<double> p = c.total_impulse();
-      given_ = std::max(0.0, c.work() - late_ * dot(p, context_.gravity));
+      given_ = std::max(0.0, c.work() - late_ * c.work_rate_of_gravity());
     }
     timer_.end(&StageTimes::solve);
+  }
+
+  /// Acceleration of each contact point by gravity alone, J g^.
+  void gravity_at_contacts() {
+    ContactStage& c = robot_.contacts;
+    if (offset_) return c.set_gravity(context_.gravity);
+    dynamics::compute_velocities(t_, zero3<double>(), robot_.gravity_acceleration.data());
+    c.take_gravity(t_);
   }
 
   // ---- drift
 
   Invariants take_invariants() {
     const Spatial<double> p = dynamics::base_momentum(t_);
-    const Vec3<double> c = t_.base.composite.h * (1 / t_.base.composite.mass);
+    const RigidInertia<double>& all = t_.base.composite;
+    const Vec3<double> c = all.mass > 0 ? all.h * (1 / all.mass) : zero3<double>();
     return {kinetic_energy(robot_.u_plus.data()), p.lin,  p.ang - cross(c, p.lin),
             c + robot_.base_position(q()),        given_, 0};
   }
@@ -380,6 +391,7 @@ void step_energy_safe(RobotData& robot, const StepContext& context) {
   if (EnergySafeStep(robot, context).run()) return;
   robot.state = robot.backup;
   robot.prepared_step = 0;
+  robot.contacts.forget();
   robot.info.status = StepStatus::kNonFinite;
 }
 

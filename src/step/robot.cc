@@ -14,6 +14,8 @@ namespace {
 
 using dynamics::LinkIndex;
 
+constexpr double kLargestJoint = 1e9;  // beyond, an angle holds less than seven digits of its turn
+
 // Names are put together for errors only: setters are called every step and may not allocate.
 void check(const std::string& owner, const char* what, std::span<const double> values,
            size_t size) {
@@ -47,14 +49,13 @@ bool any_nonzero(std::span<const double> values) {
 }  // namespace
 
 Robot::Impl::Impl(ModelPtr model, const RobotOptions& options)
-    : data(model, options), query(*model), scratch(query.tree().num_slots) {}
+    : data(model, options), query(*model), scratch(query.tree().num_slots), velocity(model->nu()) {}
 
-dynamics::Tree<double>& Robot::Impl::tree_at_state(bool velocities) {
+dynamics::Tree<double>& Robot::Impl::tree_at_state() {
   dynamics::Tree<double>& t = query.tree();
-  const double *q = data.state.q.data(), *u = data.state.u.data();
+  const double* q = data.state.q.data();
   dynamics::compute_positions(t, data.base_quaternion(q), data.joints(q));
   dynamics::compute_inertias(t);
-  if (velocities) dynamics::compute_velocities(t, data.angular(u), u + data.offset());
   return t;
 }
 
@@ -86,6 +87,10 @@ void Robot::set_state(std::span<const double> q, std::span<const double> u) {
       throw ModelError(d.name + ".q[3:7]: the base quaternion (w, x, y, z) has length " +
                        std::to_string(norm) + "; it must be a unit quaternion");
   }
+  for (int j = 0; j < d.num_joints(); ++j)
+    if (std::fabs(d.joints(q.data())[j]) > kLargestJoint)
+      throw ModelError(d.name + ".q: joint '" + d.model->joints()[j].name +
+                       "' is beyond 1e9 rad or m; wrap continuous joints");
   step::RobotState& s = d.state;
   std::copy(q.begin(), q.end(), s.q.begin());
   std::copy(u.begin(), u.end(), s.u.begin());
@@ -128,13 +133,13 @@ void Robot::set_pd_target(std::span<const double> target) {
 void Robot::mass_matrix(std::span<double> out) const {
   const int nu = model().nu();
   check_output("mass_matrix", out, nu * nu);
-  dynamics::compute_mass_matrix(impl_->tree_at_state(false), impl_->scratch.data(), out.data());
+  dynamics::compute_mass_matrix(impl_->tree_at_state(), impl_->scratch.data(), out.data());
 }
 
 void Robot::bias_force(std::span<double> out) const {
   step::RobotData& d = impl_->data;
   check_output("bias_force", out, d.state.u.size());
-  dynamics::Tree<double>& t = impl_->tree_at_state(false);
+  dynamics::Tree<double>& t = impl_->tree_at_state();
   const double* u = d.state.u.data();
   dynamics::compute_bias(t, d.angular(u), u + d.offset(), impl_->gravity);
   dynamics::collect_joint_forces(t, out.data() + d.offset());
@@ -148,7 +153,7 @@ void Robot::forward_dynamics(std::span<const double> tau, std::span<double> out)
   step::RobotData& d = impl_->data;
   check("", "tau", tau, d.state.u.size());
   check_output("forward_dynamics", out, d.state.u.size());
-  dynamics::Tree<double>& t = impl_->tree_at_state(false);
+  dynamics::Tree<double>& t = impl_->tree_at_state();
   const double* u = d.state.u.data();
   const int offset = d.offset();
   dynamics::factor_mass_matrix<double>(t, nullptr);
@@ -167,7 +172,7 @@ void Robot::jacobian(const std::string& frame_name, std::span<double> out) const
   const int nu = model().nu(), offset = d.offset();
   check_output("jacobian", out, 6 * nu);
   const Frame& frame = model().frame(frame_name);
-  const dynamics::Tree<double>& t = impl_->tree_at_state(false);
+  const dynamics::Tree<double>& t = impl_->tree_at_state();
   const auto& layout = d.memory.layout();
   const Vector3 local = layout.turned(frame.body, frame.pose.position);
   LinkIndex link = layout.link_of_body[frame.body];
@@ -193,7 +198,7 @@ void Robot::jacobian(const std::string& frame_name, std::span<double> out) const
 Pose Robot::frame_pose(const std::string& frame_name) const {
   step::RobotData& d = impl_->data;
   const Frame& frame = model().frame(frame_name);
-  const dynamics::Tree<double>& t = impl_->tree_at_state(false);
+  const dynamics::Tree<double>& t = impl_->tree_at_state();
   const auto& layout = d.memory.layout();
   const LinkIndex link = layout.link_of_body[frame.body];
   const Vector3 local = layout.turned(frame.body, frame.pose.position);
@@ -211,15 +216,20 @@ Pose Robot::frame_pose(const std::string& frame_name) const {
 }
 
 double Robot::kinetic_energy() const {
-  impl_->multiply_by_factor(impl_->data.linear(impl_->data.state.u.data()));
+  impl_->multiply_by_factor(impl_->data.state.u.data());
   return 0.5 * dynamics::squared_norm(impl_->query.tree());
 }
 
 double Robot::mechanical_energy() const {
-  const step::RobotData& d = impl_->data;
-  // A fixed base in contact keeps its small half kick out: its gravity is a joint acceleration.
-  const double pending = d.floating() ? d.state.pending_gravity : 0;
-  impl_->multiply_by_factor(madd(impl_->gravity, pending, d.linear(d.state.u.data())));
+  const step::RobotState& s = impl_->data.state;
+  double* velocity = impl_->velocity.data();
+  if (s.pending_gravity > 0)
+    impl_->gravity_acceleration(velocity);
+  else
+    std::fill(impl_->velocity.begin(), impl_->velocity.end(), 0.0);
+  for (size_t k = 0; k < s.u.size(); ++k)
+    velocity[k] = madd(s.pending_gravity, velocity[k], s.u[k]);
+  impl_->multiply_by_factor(velocity);
   return 0.5 * dynamics::squared_norm(impl_->query.tree()) + potential_energy();
 }
 
@@ -230,9 +240,10 @@ double Robot::potential_energy() const {
 }
 
 Vector3 Robot::center_of_mass() const {
-  const RigidInertia<double>& all = impl_->tree_at_state(false).base.composite;
-  const Vec3<double> c =
-      all.h * (1 / all.mass) + impl_->data.base_position(impl_->data.state.q.data());
+  const RigidInertia<double>& all = impl_->tree_at_state().base.composite;
+  const Vec3<double> base = impl_->data.base_position(impl_->data.state.q.data());
+  if (!(all.mass > 0)) return {base.x, base.y, base.z};  // a fixed base without moving bodies
+  const Vec3<double> c = all.h * (1 / all.mass) + base;
   return {c.x, c.y, c.z};
 }
 
@@ -244,18 +255,32 @@ Vector3 Robot::linear_momentum() const {
 Vector3 Robot::angular_momentum() const {
   const Spatial<double> p = impl_->momentum();
   const RigidInertia<double>& all = impl_->query.tree().base.composite;
+  if (!(all.mass > 0)) return {0, 0, 0};
   const Vec3<double> l = p.ang - cross(all.h * (1 / all.mass), p.lin);
   return {l.x, l.y, l.z};
 }
 
-void Robot::Impl::multiply_by_factor(const Vec3<double>& base_velocity) {
-  dynamics::Tree<double>& t = tree_at_state(true);
+void Robot::Impl::gravity_acceleration(double* out) {
+  const int offset = data.offset();
+  std::fill(out, out + data.state.u.size(), 0.0);
+  dynamics::Tree<double>& t = tree_at_state();
   dynamics::factor_mass_matrix<double>(t, nullptr);
-  dynamics::multiply_lower(t, base_velocity, data.state.u.data() + data.offset());
+  dynamics::compute_bias(t, zero3<double>(), out + offset, gravity);
+  dynamics::solve_lower_transposed<double>(t, nullptr, dynamics::LinkForces::kAll);
+  double base[6];
+  dynamics::solve_lower(t, base, out + offset);
+  for (int k = 0; k < offset; ++k) out[k] = base[k];
+}
+
+void Robot::Impl::multiply_by_factor(const double* u) {
+  dynamics::Tree<double>& t = tree_at_state();
+  dynamics::factor_mass_matrix<double>(t, nullptr);
+  dynamics::compute_velocities(t, data.angular(u), u + data.offset());
+  dynamics::multiply_lower(t, data.linear(u), u + data.offset());
 }
 
 Spatial<double> Robot::Impl::momentum() {
-  multiply_by_factor(data.linear(data.state.u.data()));
+  multiply_by_factor(data.state.u.data());
   return dynamics::base_momentum(query.tree());
 }
 
@@ -267,7 +292,7 @@ void Robot::delassus(std::span<const int> bodies, std::span<const Vector3> point
     throw ModelError("delassus: " + std::to_string(n) + " bodies but " +
                      std::to_string(points.size()) + " points");
   check_output("delassus", out, 9 * n * n);
-  dynamics::Tree<double>& t = impl_->tree_at_state(false);
+  dynamics::Tree<double>& t = impl_->tree_at_state();
   dynamics::factor_mass_matrix<double>(t, nullptr);
   const Vec3<double> base = d.base_position(d.state.q.data());
   std::vector<double> y(3 * n * nu, 0.0);

@@ -30,6 +30,7 @@ RobotData::RobotData(ModelPtr m, const RobotOptions& options)
     damping.push_back(j.damping);
     damped = damped || j.damping > 0;
   }
+  backup = state;  // sized here: a step allocates nothing
   q_new.resize(nq);
   implicit.resize(joints);
   for (auto* v : {&u_free, &u_plus, &rates, &force, &delta, &gravity_acceleration})

@@ -8,10 +8,12 @@ namespace stickslip {
 struct Robot::Impl {
   Impl(ModelPtr model, const RobotOptions& options);
 
-  /// Positions and inertias (and link velocities) at the present state.
-  dynamics::Tree<double>& tree_at_state(bool velocities);
-  /// L u at the present state, with this velocity of the base origin, into the query tree.
-  void multiply_by_factor(const Vec3<double>& base_velocity);
+  /// The query tree with positions and inertias at the present q.
+  dynamics::Tree<double>& tree_at_state();
+  /// L u at the present q into the query tree.
+  void multiply_by_factor(const double* u);
+  /// Accelerations (nu) by gravity alone at the present q.
+  void gravity_acceleration(double* out);
   /// Of the whole robot: lin [kg m/s], ang about the base origin [kg m^2/s].
   Spatial<double> momentum();
   void collect_contacts();
@@ -19,6 +21,7 @@ struct Robot::Impl {
   step::RobotData data;
   dynamics::TreeMemory<double> query;
   std::vector<RigidInertia<dynamics::Wide<double>>> scratch;
+  std::vector<double> velocity;  // scratch (nu)
   std::vector<Contact> contacts;
   Vec3<double> gravity;
   int index = 0;  // in the world

@@ -74,6 +74,7 @@ void step_semi_implicit(RobotData& robot, const StepContext& context) {
   for (const double x : robot.q_new) sum += std::fabs(x);
   if (!std::isfinite(sum)) {
     s.impulse = robot.backup.impulse;
+    robot.contacts.forget();
     robot.info.status = StepStatus::kNonFinite;
     return;
   }

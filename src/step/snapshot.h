@@ -13,10 +13,10 @@ struct Snapshot {
   std::vector<RobotState> robots;
 };
 
-std::vector<std::uint8_t> write_snapshot(double time, const std::vector<const RobotState*>& robots);
+std::vector<std::uint8_t> write_snapshot(double time, const std::vector<const RobotData*>& robots);
 
-/// `shapes`: states of the robots that the snapshot must fit. Throws ModelError.
+/// `robots`: those that the snapshot must fit, by name and size. Throws ModelError.
 Snapshot read_snapshot(std::span<const std::uint8_t> blob,
-                       const std::vector<const RobotState*>& shapes);
+                       const std::vector<const RobotData*>& robots);
 
 }  // namespace stickslip::step

@@ -167,15 +167,15 @@ StepStatus World::step(int steps) {
 }
 
 std::vector<std::uint8_t> World::save_state() const {
-  std::vector<const step::RobotState*> states;
-  for (const auto& r : impl_->robots) states.push_back(&r->impl_->data.state);
-  return step::write_snapshot(impl_->time, states);
+  std::vector<const step::RobotData*> robots;
+  for (const auto& r : impl_->robots) robots.push_back(&r->impl_->data);
+  return step::write_snapshot(impl_->time, robots);
 }
 
 void World::load_state(std::span<const std::uint8_t> blob) {
-  std::vector<const step::RobotState*> shapes;
-  for (const auto& r : impl_->robots) shapes.push_back(&r->impl_->data.state);
-  step::Snapshot snapshot = step::read_snapshot(blob, shapes);  // throws before anything changes
+  std::vector<const step::RobotData*> robots;
+  for (const auto& r : impl_->robots) robots.push_back(&r->impl_->data);
+  step::Snapshot snapshot = step::read_snapshot(blob, robots);  // throws before anything changes
   impl_->time = snapshot.time;
   for (size_t k = 0; k < snapshot.robots.size(); ++k) {
     step::RobotData& d = impl_->robots[k]->impl_->data;
