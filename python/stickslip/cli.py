@@ -25,6 +25,11 @@ def _parser() -> argparse.ArgumentParser:
     paper.add_argument(
         "--output", type=Path, default=Path("report"), metavar="DIR", help="folder to write to (default: %(default)s)"
     )
+    paper.add_argument(
+        "--check",
+        action="store_true",
+        help="exit status 1 if the run misses what Tables I and II claim, times among it",
+    )
     paper.set_defaults(run=_paper)
     return parser
 
@@ -32,7 +37,7 @@ def _parser() -> argparse.ArgumentParser:
 def _paper(arguments: argparse.Namespace) -> int:
     from stickslip import paper  # matplotlib and rich load here, and only here
 
-    return int(paper.run(output=arguments.output, full=arguments.full) or 0)
+    return int(paper.run(output=arguments.output, full=arguments.full, check=arguments.check) or 0)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import math
 import re
@@ -11,7 +12,7 @@ import pytest
 
 from stickslip import paper
 from stickslip.cli import main
-from stickslip.paper import page, render, report, words
+from stickslip.paper import claims, page, render, report, words
 from stickslip.paper.methods import METHODS, TASKS
 
 PICTURES = ["fig4_iterations", "fig5_stages", "fig6_laws", "fig7_penetration", "fifty_hertz"]
@@ -96,6 +97,26 @@ def test_per_contact_iteration_needs_fewer_sweeps_than_pgs(results):
         found = results["table2"]["tasks"][task]
         assert found["bisection"]["impacts"] > 0 and found["pgs"]["impacts"] > 0
         assert 5 * found["bisection"]["at_impact"] < found["pgs"]["at_impact"], task
+
+
+def test_claims_that_are_missed_are_named(results):
+    good = copy.deepcopy(results)
+    for methods in (d["methods"] for d in good["table1"]["tasks"].values()):
+        for m, ns in {"halley": 50, "bisection": 400, "golden_section": 800, "quartic": 500}.items():
+            methods[m]["ns_per_solve"] = ns
+    assert claims.missed(good) == []
+    bad = copy.deepcopy(good)
+    bad["table1"]["tasks"]["trot"]["methods"]["halley"] |= {"ns_per_solve": 120, "failures": 0.01}
+    bad["table1"]["tasks"]["random"]["methods"]["golden_section"]["ns_per_solve"] = 300
+    bad["table2"]["tasks"]["hang"]["pgs"]["at_impact"] = 4 * bad["table2"]["tasks"]["hang"]["bisection"]["at_impact"]
+    bad["table2"]["tasks"]["drop"]["pgs"]["mean"] = bad["table2"]["tasks"]["drop"]["bisection"]["mean"]
+    found = claims.missed(bad)
+    assert [text.split(":")[0] for text in found] == [
+        *["Table I, Trot"] * 3,
+        "Table I, Random",
+        "Table II, Drop",
+        "Table II, Hang",
+    ]
 
 
 def test_histograms_hold_every_step(results):

@@ -348,7 +348,9 @@ def test_state_of_other_robots_is_refused(ball: ss.Model, flail: ss.Model) -> No
         one.load_state(two.save_state())
 
 
-@pytest.mark.parametrize(("steps", "error"), [(-1, ValueError), (2**31, ValueError), (1.5, TypeError), ("2", TypeError)])
+@pytest.mark.parametrize(
+    ("steps", "error"), [(-1, ValueError), (2**31, ValueError), (1.5, TypeError), ("2", TypeError)]
+)
 def test_steps_are_counted_in_whole_numbers(ball: ss.Model, steps, error: type) -> None:
     world, _ = resting_ball(ball)
     with pytest.raises(error, match="steps"):

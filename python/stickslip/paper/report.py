@@ -13,7 +13,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from stickslip.paper import fifty_hertz, fig5, fig6, fig7, machine, page, published, strips, table1, table2
+from stickslip.paper import claims, fifty_hertz, fig5, fig6, fig7, machine, page, published, strips, table1, table2
 from stickslip.paper.methods import TASKS
 from stickslip.paper.settings import Settings
 from stickslip.paper.words import geometric_mean, millimetres, number, percent
@@ -32,8 +32,8 @@ EXPERIMENTS = {
 _RUN_ORDER = ("table1", "table2", "fig5", "fig6", "fig7", "fifty_hertz", "tasks")
 
 
-def write_report(folder: Path, settings: Settings) -> int:
-    """Measures, draws, writes; returns an exit status."""
+def write_report(folder: Path, settings: Settings, check: bool = False) -> int:
+    """Measures, draws, writes; returns an exit status, 1 if `check` is on and a claim was missed."""
     folder.mkdir(parents=True, exist_ok=True)
     console = Console()
     start = time.perf_counter()
@@ -70,7 +70,10 @@ def write_report(folder: Path, settings: Settings) -> int:
     console.print(f"\n{folder / 'report.html'} and its data, in {results['seconds']:.0f} s\n")
     for value, what in _headlines(results):
         console.print(f"  [bold]{_text(value):>14}[/]  {_text(what)}", soft_wrap=True)
-    return 0
+    broken = claims.missed(results) if check else []
+    for sentence in broken:
+        console.print(f"MISSED: {sentence}", soft_wrap=True, highlight=False)
+    return 1 if broken else 0
 
 
 def write_page(folder: Path, results: dict) -> None:
