@@ -25,6 +25,7 @@ constexpr const char* kUsage =
     "  --urdf FILE         ANYmal's description\n"
     "  --core N            pin to this core (default 1 where there is one, else 0; -1: none)\n"
     "  --no-statistics     times only; nothing is checked\n"
+    "  --check             fail (exit status 1) where an aim is missed, too\n"
     "  --json FILE         write the results there too\n";
 
 struct Options {
@@ -32,6 +33,7 @@ struct Options {
   std::vector<std::string> tasks;
   std::string urdf = STICKSLIP_ANYMAL, robots, json;
   int core = -2;
+  bool check = false;
 };
 
 std::vector<std::string> split(const std::string& list) {
@@ -54,6 +56,10 @@ Options parse(int argc, char** argv) {
     const std::string name = argv[k];
     if (name == "--no-statistics") {
       o.settings.statistics = false;
+      continue;
+    }
+    if (name == "--check") {
+      o.check = true;
       continue;
     }
     if (name == "--help" || k + 1 == argc) throw std::invalid_argument(kUsage);
@@ -80,6 +86,9 @@ Options parse(int argc, char** argv) {
   for (const std::string& e : o.settings.engines)
     if (e != "semi_implicit" && e != "energy_safe" && e != "mujoco")
       throw std::invalid_argument("unknown engine '" + e + "'\n" + kUsage);
+  const auto& engines = o.settings.engines;
+  if (o.check && !engines.empty() && std::ranges::find(engines, "mujoco") == engines.end())
+    throw std::invalid_argument("--check needs mujoco among the engines: aims are ratios to it");
   return o;
 }
 
@@ -125,6 +134,7 @@ int run(const Options& o) {
     results.push_back(measure(s, o.settings));
     print_result(results.back());
     good = print_faults(results.back()) && good;
+    if (o.check) good = print_missed_aims(results.back()) && good;
     least_share = std::min(least_share, results.back().core_share);
     disagreement = std::max(disagreement, results.back().disagreement);
   }

@@ -24,6 +24,12 @@ double target_of(const Scenario& s, const std::string& engine) {
                                    : 0;
 }
 
+/// An aim needs a ratio: without MuJoCo in the run there is none to miss.
+bool misses_aim(const ScenarioResult& r, const Measurement& m) {
+  const double ratio = r.ratio(m.engine);
+  return ratio > 0 && ratio < target_of(*r.scenario, m.engine);
+}
+
 std::string number(double x) { return std::isfinite(x) ? format("%.9g", x) : "null"; }
 
 std::string json_of(const ScenarioResult& r, const Measurement& m) {
@@ -83,7 +89,7 @@ void print_result(const ScenarioResult& r) {
         "%-13s %-13s %8.2f %7.2f %7s %6s %7.2f %7.2f %6.2f %16s %16s %17s\n",
         r.scenario->name.c_str(), m.engine.c_str(), median(m.microseconds), least,
         ours && ratio > 0 ? format("%.2f", ratio).c_str() : "",
-        ours && target > 0 ? format("%.1f%s", target, ratio < target ? " !" : "").c_str() : "",
+        ours && target > 0 ? format("%.1f%s", target, misses_aim(r, m) ? " !" : "").c_str() : "",
         f.contacts, f.pushing, f.iterations,
         r.scenario->ground
             ? format("%.4f / %.3f", 1e3 * f.mean_penetration, 1e3 * f.max_penetration).c_str()
@@ -103,6 +109,18 @@ bool print_faults(const ScenarioResult& r) {
                   fault.c_str());
       good = false;
     }
+  return good;
+}
+
+bool print_missed_aims(const ScenarioResult& r) {
+  bool good = true;
+  for (const Measurement& m : r.engines) {
+    if (!misses_aim(r, m)) continue;
+    std::printf("MISSED: %s, %s: %.2f times MuJoCo's speed, %.1f is aimed at\n",
+                r.scenario->name.c_str(), m.engine.c_str(), r.ratio(m.engine),
+                target_of(*r.scenario, m.engine));
+    good = false;
+  }
   return good;
 }
 
