@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "dynamics/kinematics.h"
+#include "dynamics/tree_layout.h"
 
 namespace stickslip::collide {
 

@@ -1,6 +1,6 @@
 // The tree as the kernels work on it: constants of the model, and the workspace one step fills.
 #pragma once
-#include "dynamics/tree_layout.h"
+#include "dynamics/branches.h"
 #include "lane/row3.h"
 #include "spatial/spatial.h"
 

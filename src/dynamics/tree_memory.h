@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "dynamics/tree.h"
+#include "dynamics/tree_layout.h"
 
 namespace stickslip::dynamics {
 
