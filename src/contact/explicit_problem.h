@@ -88,11 +88,8 @@ STICKSLIP_INLINE void add_impulse(ExplicitProblem& p, int i, const double d[3]) 
 inline double contact_residual(const ExplicitProblem& p, int i, bool max_dissipation) {
   const LocalContact<double>& k = p.local[i];
   const double *v = p.v + 3 * i, *lambda = p.lambda + 3 * i;
-  if (!max_dissipation) {
-    // An impulse so large that the velocity drowns in its rounding certifies nothing.
-    const double size = sqrt(lambda[0] * lambda[0] + lambda[1] * lambda[1] + lambda[2] * lambda[2]);
-    return natural_map_residual(k, v, lambda) + 4e-16 * k.scale * size;
-  }
+  const double rounding = impulse_rounding(k, lambda);
+  if (!max_dissipation) return natural_map_residual(k, v, lambda) + rounding;
   double c[3], own[3];
   velocity_without_own(p, i, c);
   const double speed = sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
@@ -100,7 +97,7 @@ inline double contact_residual(const ExplicitProblem& p, int i, bool max_dissipa
   const double d[3] = {lambda[0] - s.x, lambda[1] - s.y, lambda[2] - s.z};
   apply_block(k, d, own);
   const double approach = k.inv_zz > 0 ? 0.0 : max(-v[2], 0.0);
-  return sqrt(own[0] * own[0] + own[1] * own[1] + own[2] * own[2] + approach * approach);
+  return sqrt(own[0] * own[0] + own[1] * own[1] + own[2] * own[2] + approach * approach) + rounding;
 }
 
 /// The largest of them; NaN counts as infinite.

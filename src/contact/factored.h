@@ -8,7 +8,7 @@
 // problem in the velocity, so the Newton finish and the fallback do not apply: it sweeps to the
 // end, and its residual is |G_ii (lambda_i - local_i)|.
 #pragma once
-#include "contact/fallback.h"
+#include "contact/jam.h"
 
 namespace stickslip::contact {
 
@@ -51,10 +51,9 @@ struct FactoredInfo {
   int fallback_steps = 0;
 };
 
-/// |G_ii (lambda_i - local_i)|^2: what is left where the sliding law is maximum dissipation.
+/// |G_ii (lambda_i - local_i)| [m/s]: what is left where the sliding law is maximum dissipation.
 template <class S>
-STICKSLIP_INLINE S fixed_point_residual_squared(const LocalContact<S>& k, const S v[3],
-                                                const S l[3]) {
+STICKSLIP_INLINE S fixed_point_residual(const LocalContact<S>& k, const S v[3], const S l[3]) {
   S free[3], best[3], d[3];
   int evaluations;
   apply_block(k, l, free);
@@ -62,10 +61,10 @@ STICKSLIP_INLINE S fixed_point_residual_squared(const LocalContact<S>& k, const 
   solve_halley<true>(k, free, sizeof(Value<S>) == 4 ? 1e-6 : 1e-13, best, evaluations);
   for (int r = 0; r < 3; ++r) best[r] = l[r] - best[r];
   apply_block(k, best, d);
-  return madd(d[0], d[0], madd(d[1], d[1], d[2] * d[2]));
+  return sqrt(madd(d[0], d[0], madd(d[1], d[1], d[2] * d[2])));
 }
 
-/// Largest squared residual of the contacts; writes their velocities. Four contacts at a time for a
+/// Largest residual of the contacts [m/s]; writes their velocities. Four contacts at a time for a
 /// plain scalar.
 template <int M, bool kMaxDissipation, class S>
 STICKSLIP_STAGE S certify(FactoredProblem<S>& p) {
@@ -92,9 +91,10 @@ STICKSLIP_STAGE S certify(FactoredProblem<S>& p) {
     }
     T e;
     if constexpr (kMaxDissipation)
-      e = fixed_point_residual_squared(k, v, l);
+      e = fixed_point_residual(k, v, l);
     else
-      e = natural_map_residual_squared(k, v, l);
+      e = natural_map_residual(k, v, l);
+    e = e + impulse_rounding(k, l);
     worst = max(worst, e);
     sum = sum + e;
   }
@@ -162,21 +162,19 @@ void extract_lane(const FactoredProblem<S>& p, int lane, FactoredProblem<double>
   }
 }
 
-template <int M, class S>
-__attribute__((noinline)) void run_fallback(FactoredProblem<S>& p, Mask<S> lanes, S tolerance,
-                                            FactoredInfo<S>& info) {
+/// Calls f(problem, lane) with each of the lanes as a prepared problem in double, and takes the
+/// impulses that it leaves.
+template <int M, class S, class F>
+void solve_lanes(FactoredProblem<S>& p, Mask<S> lanes, F&& f) {
   for (int l = 0; l < ScalarTraits<S>::kWidth; ++l) {
     if (!get_lane(lanes, l)) continue;
-    ++info.fallbacks;
     if constexpr (ScalarTraits<S>::kWidth == 1 && sizeof(S) == 8) {
       // Prepared afresh, as a lane of a pack is below: the same bits either way.
       for (int i = 0; i < p.size(); ++i) {
         store(p.contact(i).lambda, p.contact(i).impulse);
         prepare_contact<M>(p.contact(i));
       }
-      Fallback<M> fallback(p, tolerance);
-      fallback.run();
-      info.fallback_steps += fallback.steps();
+      f(p, l);
     } else {
       FactoredProblem<double>& q = *p.lane;
       extract_lane(p, l, q);
@@ -184,9 +182,7 @@ __attribute__((noinline)) void run_fallback(FactoredProblem<S>& p, Mask<S> lanes
         q.complete(i);
         prepare_contact<M>(q.contact(i));
       }
-      Fallback<M> fallback(q, double(get_lane(tolerance, l)));
-      fallback.run();
-      info.fallback_steps += fallback.steps();
+      f(q, l);
       for (int i = 0; i < q.size(); ++i) {
         double from[3];
         S to[3];
@@ -199,6 +195,32 @@ __attribute__((noinline)) void run_fallback(FactoredProblem<S>& p, Mask<S> lanes
       for (int k = 0; k < p.dofs(); ++k) set_lane(p.w[k], l, Value<S>(q.w[k]));
     }
   }
+}
+
+template <int M, class S>
+__attribute__((noinline)) void run_fallback(FactoredProblem<S>& p, Mask<S> lanes, S tolerance,
+                                            FactoredInfo<S>& info) {
+  solve_lanes<M>(p, lanes, [&](FactoredProblem<double>& q, int lane) {
+    ++info.fallbacks;
+    Fallback<M> fallback(q, double(get_lane(tolerance, lane)));
+    fallback.run();
+    info.fallback_steps += fallback.steps();
+  });
+}
+
+/// Of the lanes that are not solved, those that jam get a bounded answer that does not sink
+/// (jam.h).
+template <int M, bool kMaxDissipation, class S>
+__attribute__((noinline)) void release_jams(FactoredProblem<S>& p, Mask<S> bad, S fastest,
+                                            S allowed) {
+  const JamLimits<S> limits = jam_limits(fastest, allowed);
+  const auto jammed = bad & jammed_lanes(p, limits);
+  if (!any(jammed)) return;
+  solve_lanes<M>(p, jammed, [&](FactoredProblem<double>& q, int lane) {
+    const JamLimits<double> one = {double(get_lane(limits.impulse, lane)),
+                                   double(get_lane(limits.sinking, lane))};
+    JamRelease<M, kMaxDissipation>(q, one, double(get_lane(allowed, lane))).run();
+  });
 }
 
 template <int M, bool kMaxDissipation, class S>
@@ -226,14 +248,21 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
   const auto finite = sum < constant<S>(1e30);  // false for NaN
   auto open = iterate<M, kMaxDissipation>(p, finite, tolerance_squared, o, info);
   S worst = certify<M, kMaxDissipation>(p);
-  auto bad = finite & !(worst <= allowed * allowed);
-  if (!kMaxDissipation && o.fallback && any(bad)) {
-    run_fallback<M>(p, bad, allowed * constant<S>(0.9), info);
-    worst = certify<M, kMaxDissipation>(p);
+  auto bad = finite & !(worst <= allowed);
+  if (any(bad)) {
+    if (!kMaxDissipation && o.fallback) {
+      run_fallback<M>(p, bad, allowed * constant<S>(0.9), info);
+      worst = certify<M, kMaxDissipation>(p);
+      bad = finite & !(worst <= allowed);
+    }
+    if (any(bad)) {
+      release_jams<M, kMaxDissipation>(p, bad, sqrt(fastest), allowed);
+      worst = certify<M, kMaxDissipation>(p);
+    }
   }
   (void)open;
-  info.residual = sqrt(worst);
-  info.converged = finite & (worst <= allowed * allowed);
+  info.residual = worst;
+  info.converged = finite & (worst <= allowed);
   for (int i = 0; i < p.size(); ++i) {
     FactoredContact<S>& c = p.contact(i);
     store(c.lambda, c.impulse);

@@ -21,6 +21,10 @@ class Fallback {
     best_residual_ = 1e300;
     accumulate<M>(p_);
     if (keep_if_better()) return true;
+    if (!(best_residual_ < 1e300)) {
+      clear();
+      if (keep_if_better()) return true;
+    }
     // First from where the sweeps ended, then from rest with other weights. Weights and shrinking
     // by measurement on 8- to 12-contact impacts: faster shrinking loses some, a smaller first
     // weight costs steps.
@@ -67,11 +71,11 @@ class Fallback {
       double v[3], l[3];
       contact_velocity<M>(c, p_.w, v);
       store(c.lambda, l);
-      const double e = natural_map_residual_squared(c.local, v, l);
+      const double e = natural_map_residual(c.local, v, l) + impulse_rounding(c.local, l);
       worst = max(worst, e);
       sum += e;
     }
-    return sqrt(worst) + 0 * sum;  // NaN if any is
+    return worst + 0 * sum;  // NaN if any is
   }
   bool keep_if_better() {
     const double r = residual();

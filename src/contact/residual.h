@@ -40,4 +40,13 @@ STICKSLIP_INLINE S natural_map_residual(const LocalContact<S>& k, const S v[3], 
   return sqrt(natural_map_residual_squared(k, v, lambda));
 }
 
+/// What the rounding of an impulse may hide of a velocity [m/s]: an impulse so large that the
+/// velocity drowns in its rounding certifies nothing. Part of every residual.
+template <class S>
+STICKSLIP_INLINE S impulse_rounding(const LocalContact<S>& k, const S lambda[3]) {
+  const S eps = constant<S>(sizeof(Value<S>) == 4 ? 2e-7 : 4e-16);
+  return eps * k.scale *
+         sqrt(lambda[0] * lambda[0] + lambda[1] * lambda[1] + lambda[2] * lambda[2]);
+}
+
 }  // namespace stickslip::contact
