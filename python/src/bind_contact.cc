@@ -6,6 +6,7 @@
 #include <stickslip/errors.h>
 
 #include "bindings.h"
+#include "contact/method_of.h"
 #include "scenes/time_methods.h"
 #include "words.h"
 
@@ -84,19 +85,6 @@ nb::tuple solve_single(const VectorIn& delassus, const VectorIn& free_velocity, 
   return nb::make_tuple(copy_array(r.impulse), r.evaluations, r.converged);
 }
 
-contact::Method kernel_method(SingleContactMethod m) {
-  switch (m) {
-    case SingleContactMethod::kBisection:
-      return contact::Method::kBisection;
-    case SingleContactMethod::kGoldenSection:
-      return contact::Method::kGoldenSection;
-    case SingleContactMethod::kQuartic:
-      return contact::Method::kQuartic;
-    default:
-      return contact::Method::kHalley;
-  }
-}
-
 /// One (ns per solve, evaluations per sliding contact, share of failures) per method; the methods
 /// take turns.
 nb::list time_single_contact(const VectorIn& delassus, const VectorIn& free_velocity,
@@ -108,7 +96,7 @@ nb::list time_single_contact(const VectorIn& delassus, const VectorIn& free_velo
     const SingleContactMethod method = choice("method", m, kSingleContactMethods);
     if (method == SingleContactMethod::kGoldenSection && !max_dissipation)
       throw ModelError("time_single_contact: golden_section has no form for law coulomb");
-    kernels.push_back(kernel_method(method));
+    kernels.push_back(contact::method_of(method));
   }
   const std::size_t n = friction.size();
   if (n == 0 || delassus.size() != 9 * n || free_velocity.size() != 3 * n)

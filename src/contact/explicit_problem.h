@@ -160,7 +160,9 @@ struct SweepOptions {
          gamma = 1;  ///< [Hwangbo 2018] Algorithm 2; PGS: alpha of eq. 18, constant
   double local_tolerance =
       0;  ///< of the single-contact method [N s]; 0: a tenth of what `tolerance` needs
-  double* history = nullptr;  ///< (max_sweeps) value of the stop test after each sweep, or none
+  /// Called with `history` and the value of the stop test after each sweep, if not null.
+  void (*record)(void* history, double error) = nullptr;
+  void* history = nullptr;
 };
 
 struct SweepResult {
@@ -194,7 +196,7 @@ inline bool end_sweep(ExplicitProblem& p, const SweepOptions& o, double updates,
     refresh_velocity(p);
     r.error = stop_error(p, o, updates);
   }
-  if (o.history) o.history[r.sweeps] = r.error;
+  if (o.record) o.record(o.history, r.error);
   ++r.sweeps;
   r.converged = r.error <= o.tolerance;
   return r.converged || !(r.error < 1e300);

@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "contact/factored.h"
+#include "contact/method_of.h"
 #include "contact/per_contact.h"
 #include "contact/pgs.h"
 #include "contact/validate.h"
@@ -18,19 +19,6 @@ namespace {
 using contact::ExplicitProblem;
 
 bool is_max_dissipation(FrictionLaw law) { return law == FrictionLaw::kMaxDissipation; }
-
-contact::Method method_of(SingleContactMethod m) {
-  switch (m) {
-    case SingleContactMethod::kBisection:
-      return contact::Method::kBisection;
-    case SingleContactMethod::kGoldenSection:
-      return contact::Method::kGoldenSection;
-    case SingleContactMethod::kQuartic:
-      return contact::Method::kQuartic;
-    default:
-      return contact::Method::kHalley;
-  }
-}
 
 /// An explicit problem and its memory.
 struct Explicit {
@@ -67,7 +55,7 @@ struct Best {
 contact::SweepOptions sweep_options(const SolveOptions& o) {
   contact::SweepOptions s;
   s.max_dissipation = is_max_dissipation(o.law);
-  s.method = method_of(o.single_contact);
+  s.method = contact::method_of(o.single_contact);
   s.stop = static_cast<contact::StopTest>(o.stop);
   s.tolerance = o.tolerance, s.max_sweeps = o.max_sweeps;
   s.alpha = o.alpha, s.alpha_min = o.alpha_min, s.gamma = o.gamma;
@@ -80,11 +68,14 @@ static_assert(int(StopTest::kResidual) == int(contact::StopTest::kResidual) &&
 
 /// One sweep loop on the explicit form; adds to the result's counts and history.
 void run_sweeps(Explicit& e, contact::SweepOptions o, bool pgs, bool record, SolveResult& r) {
-  std::vector<double> history;
-  if (record) history.resize(o.max_sweeps), o.history = history.data();
+  if (record) {
+    o.history = &r.history;
+    o.record = [](void* history, double error) {
+      static_cast<std::vector<double>*>(history)->push_back(error);
+    };
+  }
   const contact::SweepResult s = pgs ? contact::pgs(e.view, o) : contact::per_contact(e.view, o);
   r.sweeps += s.sweeps;
-  if (record) r.history.insert(r.history.end(), history.begin(), history.begin() + s.sweeps);
 }
 
 struct Free {
@@ -226,7 +217,7 @@ SingleContactResult solve_contact(const double delassus[9], const double free_ve
   const double stop = halley ? options.tolerance * speed : options.tolerance;
   SingleContactResult r{};
   contact::with_method(
-      method_of(options.method), is_max_dissipation(options.law), [&](auto m, auto law) {
+      contact::method_of(options.method), is_max_dissipation(options.law), [&](auto m, auto law) {
         const auto s = contact::solve_single<decltype(m)::value, decltype(law)::value>(
             e.view.local[0], c, stop);
         r.impulse[0] = s.x, r.impulse[1] = s.y, r.impulse[2] = s.z;

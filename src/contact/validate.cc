@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <sstream>
+#include <string>
 
 #include "contact/dense_factor.h"
 
@@ -96,27 +97,31 @@ void check_single(SingleContactMethod method, FrictionLaw law, const char* where
          "max_dissipation, or halley, bisection or quartic");
 }
 
+void check_settings(const char* where, const SolverSettings& s) {
+  if (!(s.tolerance > 0) || std::isinf(s.tolerance))
+    fail(where, ".tolerance is ", s.tolerance, "; it must be positive [m/s]");
+  if (s.max_sweeps < 1) fail(where, ".max_sweeps is ", s.max_sweeps, "; it must be at least 1");
+  if (!(s.alpha > 0 && s.alpha <= 2)) fail(where, ".alpha is ", s.alpha, "; it must lie in (0, 2]");
+  if (!(s.alpha_min > 0 && s.alpha_min <= 2))
+    fail(where, ".alpha_min is ", s.alpha_min, "; it must lie in (0, 2]");
+  if (!(s.gamma >= 0 && s.gamma <= 1))
+    fail(where, ".gamma is ", s.gamma, "; it must lie in [0, 1]");
+  if (s.method == SolveMethod::kPgs && s.law != FrictionLaw::kCoulomb)
+    fail(where,
+         ": pgs solves law coulomb only (eq. 6); use per_contact or auto for max_dissipation");
+  if (s.method == SolveMethod::kPerContact)
+    check_single(s.single_contact, s.law, (std::string(where) + ".single_contact").c_str());
+}
+
 }  // namespace contact
 
 void ContactProblem::validate() const { contact::validated_factor(*this); }
 
 void SolveOptions::validate() const {
-  if (!(tolerance > 0) || std::isinf(tolerance))
-    fail("SolveOptions.tolerance is ", tolerance, "; it must be positive [m/s]");
-  if (max_sweeps < 1) fail("SolveOptions.max_sweeps is ", max_sweeps, "; it must be at least 1");
+  contact::check_settings("SolveOptions", contact::settings_of(*this));
   if (!(single_contact_tolerance >= 0) || std::isinf(single_contact_tolerance))
     fail("SolveOptions.single_contact_tolerance is ", single_contact_tolerance,
          "; it must be zero or positive [N s]");
-  if (!(alpha > 0 && alpha <= 2)) fail("SolveOptions.alpha is ", alpha, "; it must lie in (0, 2]");
-  if (!(alpha_min > 0 && alpha_min <= 2))
-    fail("SolveOptions.alpha_min is ", alpha_min, "; it must lie in (0, 2]");
-  if (!(gamma >= 0 && gamma <= 1)) fail("SolveOptions.gamma is ", gamma, "; it must lie in [0, 1]");
-  if (method == SolveMethod::kPgs && law != FrictionLaw::kCoulomb)
-    fail(
-        "SolveOptions: pgs solves law coulomb only (eq. 6); use per_contact or auto for "
-        "max_dissipation");
-  if (method == SolveMethod::kPerContact)
-    contact::check_single(single_contact, law, "SolveOptions.single_contact");
 }
 
 }  // namespace stickslip

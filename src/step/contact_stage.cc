@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <new>
 
+#include "contact/method_of.h"
 #include "contact/per_contact.h"
 #include "contact/pgs.h"
 #include "contact/write_out.h"
@@ -317,7 +318,7 @@ void ContactStage::solve_explicit(const StepSolverOptions& options, StepInfo& in
   contact::prepare(p);
   contact::SweepOptions o;
   o.max_dissipation = options.law == FrictionLaw::kMaxDissipation;
-  o.method = static_cast<contact::Method>(options.single_contact);
+  o.method = contact::method_of(options.single_contact);
   o.stop = options.method == SolveMethod::kPgs ? contact::StopTest::kUpdateSum
                                                : contact::StopTest::kViolationSum;
   o.tolerance = options.tolerance;

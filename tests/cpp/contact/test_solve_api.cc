@@ -83,6 +83,14 @@ TEST(BadOptionsAndImpulsesAreNamed) {
                "golden_section");
 }
 
+TEST(AHistoryIsAsLongAsTheSolveWhateverTheCap) {
+  SolveOptions o;
+  o.method = SolveMethod::kPerContact, o.record_history = true;
+  o.max_sweeps = std::numeric_limits<int>::max();
+  const SolveResult r = solve(block(), o);
+  CHECK(int(r.history.size()) == r.sweeps && r.sweeps < 100);
+}
+
 TEST(AProblemWithoutContactsIsSolved) {
   const SolveResult r = solve({}, {});
   CHECK(r.status == SolveStatus::kConverged && r.impulse.empty() && r.residual == 0);
@@ -272,6 +280,27 @@ TEST(SolveContactAgreesWithSolve) {
     CHECK(b.converged && b.evaluations > 0);
     for (int k = 0; k < 3; ++k) CHECK_NEAR(a.impulse[k], b.impulse[k], 1e-8);
   }
+}
+
+TEST(AJammedContactIsFiniteAndNotCalledSolved) {
+  // A planar arm, G = j j^T, driven at the ground so that friction presses it in: no finite
+  // impulse.
+  const double j[3] = {-1, 0, 0.5}, mu = 0.8;
+  ContactProblem p{std::vector<double>(9), {1, 0, -0.5 - 0.3}, {mu}};
+  for (int a = 0; a < 9; ++a) p.delassus[a] = j[a / 3] * j[a % 3];
+  for (const SolveMethod method : {SolveMethod::kAuto, SolveMethod::kPerContact, SolveMethod::kPgs})
+    for (const double sign : {1.0, -1.0}) {
+      p.free_velocity[2] = -0.5 - 0.3 * sign;
+      SolveOptions o;
+      o.method = method;
+      const SolveResult r = solve(p, o);
+      CHECK(finite(r));
+      CHECK((r.status == SolveStatus::kConverged) == (r.residual <= o.tolerance));
+      SingleContactOptions single;
+      const auto s = solve_contact(p.delassus.data(), p.free_velocity.data(), mu, single);
+      CHECK(std::isfinite(s.impulse[0]) && std::isfinite(s.impulse[2]));
+      CHECK(s.converged == (r.status == SolveStatus::kConverged) || method != SolveMethod::kAuto);
+    }
 }
 
 TEST(MatricesRoundedToFewDigitsAreSolvedAsTheyAre) {
