@@ -216,8 +216,9 @@ STICKSLIP_INLINE void solve_halley(const LocalContact<S>& k, const S c[3], doubl
                                    S lambda[3], int& evaluations) {
   const S zero = constant<S>(0);
   const Reduced<S> r = reduce(k, c[0], c[1], c[2]);
-  lambda[0] = select(r.stick, r.x, zero);
-  lambda[1] = select(r.stick, r.y, zero);
+  // + 0: a zero has one sign, whichever way it came about.
+  lambda[0] = select(r.stick, r.x, zero) + zero;
+  lambda[1] = select(r.stick, r.y, zero) + zero;
   lambda[2] = select(r.stick, r.z, zero);
   evaluations = 0;
   if (any(r.slip)) {

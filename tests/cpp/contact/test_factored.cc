@@ -57,6 +57,8 @@ std::vector<double> dense_sweeps(const RobotProblem& p, int sweeps) {
   return l;
 }
 
+/// Except that an impulse of zero may have either sign: which visits a sweep skips depends on the
+/// other lanes (docs/limits.md).
 template <class S>
 bool same_bits(S a, S b) {
   return std::memcmp(&a, &b, sizeof a) == 0 || (a == 0 && b == 0);
