@@ -20,6 +20,7 @@ HOST_FOLDERS = ("collide", "step", "backend")
 # Headers of kernel folders for the host side: they size memory and read models.
 HOST_HEADERS = {
     "contact/dense_factor.h",
+    "contact/method_of.h",
     "contact/validate.h",
     "dynamics/tree_layout.h",
     "dynamics/tree_memory.h",

@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "contact/validate.h"
 #include "step/robot_impl.h"
 #include "step/snapshot.h"
 
@@ -27,18 +28,10 @@ void WorldOptions::validate() const {
   if (max_substeps < 1)
     reject("max_substeps must be at least 1, got " + std::to_string(max_substeps));
   const StepSolverOptions& s = solver;
-  if (!(s.tolerance > 0) || !std::isfinite(s.tolerance))
-    reject("solver tolerance must be positive");
-  if (!(s.relative_tolerance >= 0)) reject("solver relative_tolerance must be >= 0");
-  if (s.max_sweeps < 1) reject("solver max_sweeps must be at least 1");
-  if (!(s.alpha > 0 && s.alpha <= 1)) reject("solver alpha must be in (0, 1]");
-  if (!(s.alpha_min > 0 && s.alpha_min <= 1)) reject("solver alpha_min must be in (0, 1]");
-  if (!(s.gamma > 0 && s.gamma <= 1)) reject("solver gamma must be in (0, 1]");
-  if (s.method == SolveMethod::kPgs && s.law == FrictionLaw::kMaxDissipation)
-    reject("solver method pgs solves Coulomb's law only; choose law coulomb or another method");
-  if (s.method == SolveMethod::kPerContact && s.law == FrictionLaw::kCoulomb &&
-      s.single_contact == SingleContactMethod::kGoldenSection)
-    reject("golden_section minimizes energy and needs law max_dissipation");
+  contact::check_settings("WorldOptions.solver", contact::settings_of(s));
+  if (!(s.relative_tolerance >= 0) || !std::isfinite(s.relative_tolerance))
+    reject("WorldOptions.solver.relative_tolerance must be finite and >= 0, got " +
+           std::to_string(s.relative_tolerance));
 }
 
 struct World::Impl {
