@@ -72,7 +72,7 @@ TEST(BadOptionsAreNamed) {
   refused([](O& o) { o.solver.relative_tolerance = kNan; }, "relative_tolerance");
   refused([](O& o) { o.solver.max_sweeps = 0; }, "max_sweeps");
   refused([](O& o) { o.solver.alpha = 0; }, "alpha");
-  refused([](O& o) { o.solver.alpha_min = 1.5; }, "alpha_min");
+  refused([](O& o) { o.solver.alpha_min = 2.5; }, "alpha_min");
   refused([](O& o) { o.solver.gamma = kNan; }, "gamma");
   refused(
       [](O& o) {
@@ -211,7 +211,7 @@ TEST(BytesThatAreNoStateOfThisWorldAreRefused) {
   }
   World other;
   other.add_robot(sphere(0.1, 1));
-  CHECK_REFUSED(world.load_state(other.save_state()), "another world");
+  CHECK_REFUSED(world.load_state(other.save_state()), "the state is of robot");
   World none;
   CHECK_REFUSED(world.load_state(none.save_state()), "0 robots");
   world.load_state(good);
