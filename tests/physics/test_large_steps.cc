@@ -42,7 +42,7 @@ TEST(DropAt20MillisecondsNeitherExplodesNorGainsEnergy) {
   CHECK(s.max_energy_growth < 1e-2);
 }
 
-TEST(DropAtSmallStepsKeepsItsEnergyToRounding) {
+TEST(DropAtSmallStepsGainsLessThanTenMicrojoules) {
   const Statistics s = run_episodes(TaskKind::kDrop, options(1e-3), 30, true);
   print("drop", 1e-3, s);
   CHECK(s.exploded == 0);

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "check.h"
+#include "contact/owned_problem.h"
 #include "contact/robot_problems.h"
 
 using namespace stickslip;
@@ -11,22 +12,6 @@ using namespace stickslip::contact;
 using namespace problems;
 
 namespace {
-
-/// A factored problem with its memory.
-template <class S>
-struct Owned {
-  explicit Owned(FactoredCapacity capacity = {12, 12}) {
-    const long bytes = (FactoredProblem<S>::required_bytes(capacity) + 63) / 64 * 64;
-    memory.reset(static_cast<char*>(std::aligned_alloc(64, bytes)));
-    std::memset(memory.get(), 0xff, bytes);  // NaN: what is read before it is written shows
-    p.attach(memory.get(), capacity);
-  }
-  struct Free {
-    void operator()(char* m) const { std::free(m); }
-  };
-  std::unique_ptr<char, Free> memory;
-  FactoredProblem<S> p;
-};
 
 /// Plain per-contact iteration on the dense operator, every visit solved to convergence: the slow
 /// reference.

@@ -5,6 +5,7 @@
 
 #include "check.h"
 #include "contact/factored.h"
+#include "contact/owned_problem.h"
 #include "contact/random_problems.h"
 
 using namespace stickslip;
@@ -12,23 +13,6 @@ using namespace stickslip::contact;
 using problems::Random;
 
 namespace {
-
-/// A factored problem with its memory.
-template <class S>
-struct Owned {
-  Owned() {
-    const FactoredCapacity capacity{4, 12};
-    const long bytes = (FactoredProblem<S>::required_bytes(capacity) + 63) / 64 * 64;
-    memory.reset(static_cast<char*>(std::aligned_alloc(64, bytes)));
-    std::memset(memory.get(), 0xff, bytes);  // NaN: what is read before it is written shows
-    p.attach(memory.get(), capacity);
-  }
-  struct Free {
-    void operator()(char* m) const { std::free(m); }
-  };
-  std::unique_ptr<char, Free> memory;
-  FactoredProblem<S> p;
-};
 
 /// A planar arm of `dofs` joints (1 or 2) with `n` points on the ground, driven at it: v = Y q.
 struct Arm {
