@@ -75,7 +75,7 @@ def project(mu, z) -> np.ndarray:
 
 
 def project_by_search(mu, z):
-    """The same by search over all rays of the cone, (N,) and (N, 3): returns the point and its distance from z."""
+    """The same by search for the ray of the cone that comes closest: mu (N,), z (N, 3); the point and its distance."""
     mu, z = capped(mu), real(z)
     opening = np.arctan(mu)
 
@@ -86,12 +86,15 @@ def project_by_search(mu, z):
 
     def distance(x):
         d = ray(x)
-        return norm(z[:, None] - np.maximum((d * z[:, None]).sum(-1), 0)[..., None] * d)
+        along = (d * z[:, None]).sum(-1)[..., None]
+        # A ray that points away is the worse the more it does, so that the search leaves it.
+        return norm(z[:, None] - np.maximum(along, 0) * d) - np.minimum(along, 0)[..., 0]
 
-    turn = np.full(len(z), np.pi, dtype=Real)
-    x, value = search(distance, np.stack([-turn, 0 * turn], 1), np.stack([turn, opening], 1))
+    turn = np.full(len(z), 3.5, dtype=Real)  # beyond pi, so that no minimum lies at an end
+    x, _ = search(distance, np.stack([-turn, 0 * turn], 1), np.stack([turn, opening], 1))
     d = ray(x)
-    return np.maximum((d * z).sum(-1), 0)[:, None] * d, value
+    point = np.maximum((d * z).sum(-1), 0)[:, None] * d
+    return point, norm(z - point)
 
 
 # Residual of Coulomb's law ------------------------------------------------------------------------------------------
@@ -234,7 +237,7 @@ def dissipation_by_search(G, c, mu):
         e = energy(g, k, sliding_impulse(g, k, m, x[..., 0]))
         return np.where(np.isnan(e), np.inf, e)
 
-    turn = np.full((len(k), 1), np.pi, dtype=Real)
+    turn = np.full((len(k), 1), 3.5, dtype=Real)  # beyond pi, so that no minimum lies at an end
     angle, _ = search(slide_energy, -turn, turn, points=1441)
     out[slips] = sliding_impulse(g, k, m, angle)[:, 0]
     return out
@@ -287,7 +290,7 @@ def conic_program(G, c, mu, fixed_normal=()) -> np.ndarray:
     """min r' G r / 2 + c' r over r_i in the cone of friction mu_i (> 0), by an interior point solver (clarabel).
 
     fixed_normal: contacts whose normal velocity is held at 0. Solved in units in which G and c are of order one. The
-    solver ends at an energy within 1e-14 of the least, thus at velocities within 1e-7: `finish` brings them to rounding.
+    solver ends at an energy within 1e-11 of the least, thus at velocities within 1e-5: `finish` brings them to rounding.
     """
     G, c, mu = np.asarray(G, float), np.asarray(c, float), np.asarray(capped(mu), float)
     n = len(mu)
@@ -300,7 +303,7 @@ def conic_program(G, c, mu, fixed_normal=()) -> np.ndarray:
     cones = ([clarabel.ZeroConeT(len(normal))] if normal else []) + [clarabel.SecondOrderConeT(3)] * n
     settings = clarabel.DefaultSettings()
     settings.verbose = False
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-14
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-11  # below, it may stop far from the answer
     r = np.array(clarabel.DefaultSolver(sp.csc_matrix(np.triu(G)), c, A, b, cones, settings).solve().x)
     return finish(G, c, mu, r, normal) * speed * mass
 
@@ -315,9 +318,8 @@ def optimality(G, c, mu, r, normal, price):
 def finish(G, c, mu, r, normal) -> np.ndarray:
     """Newton steps on the optimality conditions of the conic program; only steps that better them are taken."""
     m, k = len(c), len(normal)
-    price = real(
-        np.linalg.lstsq((G[:, normal].T * r).reshape(k, -1, 3).sum(2).T, -((G @ r + c) * r).reshape(-1, 3).sum(1))[0]
-    )
+    work = (r * (G @ r + c)).reshape(-1, 3).sum(1)
+    price = real([-work[j // 3] / (r[j - 2 : j + 1] @ G[j - 2 : j + 1, j]) for j in normal])
     left, z = optimality(G, c, mu, r, normal, price)
     for _ in range(20):
         D = np.zeros((m, m))
