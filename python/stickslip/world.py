@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +18,9 @@ from stickslip._arguments import array, count, number
 from stickslip._core import Model, Pose, load_urdf
 from stickslip.contact import ContactProblem
 from stickslip.reports import Contact, SolveInfo, StageTimes, StepStatus
+
+if TYPE_CHECKING:
+    from stickslip.recording import Recorder
 
 __all__ = ["Contact", "Robot", "SolveInfo", "StageTimes", "StepError", "StepStatus", "World"]
 
@@ -304,7 +308,9 @@ class World:
             gamma=number("gamma", gamma),
             warm_start=bool(warm_start),
         )
+        self._method, self._law = method, law
         self._robots: list[Robot] = []
+        self._stepper: _core.World | Recorder = self._core
 
     def __repr__(self) -> str:
         robots = ", ".join(robot.name for robot in self._robots) or "no robots"
@@ -391,7 +397,7 @@ class World:
 
         StepError when a robot's velocities overflow: the stepping ends there, `time` says where.
         """
-        bits, done = self._core.step(count("steps", steps))
+        bits, done = self._stepper.step(count("steps", steps))
         status = StepStatus(bits)
         if StepStatus.NON_FINITE in status:
             names = [robot.name for robot in self._robots if StepStatus.NON_FINITE in robot.solve_info.status]
@@ -401,6 +407,22 @@ class World:
                 names,
             )
         return status
+
+    def record_contact_problems(self, path: str | os.PathLike[str] | None, every: int = 1) -> None:
+        """From now on writes the contact problems of every `every`-th step that has contacts to FCLIB files; None stops it.
+
+        path: a folder (made if missing), or a pattern of file names with {step} (number of the step, from time 0), {robot},
+            {index}, {time} [s], as in "drop/{step:06d}_{robot}.hdf5". One file per robot; files that are there are replaced.
+
+        The solver's impulse and velocity are the file's solution, texts say time, robot, law and residual. Steps have the same
+        bits with and without recording. ValueError for a bad pattern or `every`; OSError from here or `step` where it cannot write.
+        """
+        if path is None:
+            self._stepper = self._core
+            return
+        from stickslip.recording import Recorder  # imports HDF5 and SciPy, which stepping does without
+
+        self._stepper = Recorder(self, path, every)
 
     @property
     def contacts(self) -> list[Contact]:
