@@ -179,7 +179,7 @@ def _reals(group: h5py.Group, name: str, values: ArrayLike) -> None:
 
 def _text(group: h5py.Group, name: str, text: str) -> None:
     """A string of fixed length that ends in a zero, as FCLIB's C code wants to read it; h5py would not write that zero."""
-    data = text.encode("utf-8") + b"\0"
+    data = text.encode("utf-8", errors="replace") + b"\0"
     if b"\0" in data[:-1]:
         raise ValueError(f"{name} has a zero character; FCLIB's texts end there")
     kind = h5py.h5t.C_S1.copy()
@@ -187,6 +187,7 @@ def _text(group: h5py.Group, name: str, text: str) -> None:
     kind.set_strpad(h5py.h5t.STR_NULLTERM)
     kind.set_cset(h5py.h5t.CSET_UTF8)
     space = h5py.h5s.create(h5py.h5s.SCALAR)
-    h5py.h5d.create(group.id, name.encode(), kind, space).write(
-        space, space, np.array(data, dtype=f"S{len(data)}"), kind
-    )
+    timeless = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    timeless.set_obj_track_times(False)  # the same problem gives the same file, as h5py sees to elsewhere
+    dataset = h5py.h5d.create(group.id, name.encode(), kind, space, dcpl=timeless)
+    dataset.write(space, space, np.array(data, dtype=f"S{len(data)}"), kind)
