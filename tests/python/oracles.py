@@ -35,7 +35,7 @@ def norm(x) -> np.ndarray:
 
 
 def search(f, low, high, points: int = 33, rounds: int = 60, zoom: float = 0.35):
-    """Least f over a box per problem: a grid, then smaller and smaller grids around the best point so far.
+    """Least f per problem: a grid on a box, then smaller and smaller grids around the best point so far, which may leave it.
 
     low, high: (N, k). f takes (N, M, k) and gives (N, M). No derivative, no structure. Returns the point (N, k) and f (N,).
     A minimum is found to about the root of the type's epsilon, its value to the epsilon.
@@ -50,7 +50,7 @@ def search(f, low, high, points: int = 33, rounds: int = 60, zoom: float = 0.35)
     rows = np.arange(len(low))
     for r in range(rounds):
         grid = real(fine if r == 0 else coarse) * 2 - 1
-        x = np.clip(center[:, None] + grid * half[:, None], low[:, None], high[:, None])
+        x = center[:, None] + grid * half[:, None]
         y = f(x)
         at = np.argmin(y, axis=1)
         better = y[rows, at] < value
@@ -80,9 +80,8 @@ def project_by_search(mu, z):
     opening = np.arctan(mu)
 
     def ray(x):
-        return np.stack(
-            [np.sin(x[..., 1]) * np.cos(x[..., 0]), np.sin(x[..., 1]) * np.sin(x[..., 0]), np.cos(x[..., 1])], -1
-        )
+        angle, tilt = x[..., 0], np.clip(x[..., 1], 0, opening.reshape(-1, *[1] * (x.ndim - 2)))
+        return np.stack([np.sin(tilt) * np.cos(angle), np.sin(tilt) * np.sin(angle), np.cos(tilt)], -1)
 
     def distance(x):
         d = ray(x)
@@ -90,7 +89,7 @@ def project_by_search(mu, z):
         # A ray that points away is the worse the more it does, so that the search leaves it.
         return norm(z[:, None] - np.maximum(along, 0) * d) - np.minimum(along, 0)[..., 0]
 
-    turn = np.full(len(z), 3.5, dtype=Real)  # beyond pi, so that no minimum lies at an end
+    turn = np.full(len(z), np.pi, dtype=Real)
     x, _ = search(distance, np.stack([-turn, 0 * turn], 1), np.stack([turn, opening], 1))
     d = ray(x)
     point = np.maximum((d * z).sum(-1), 0)[:, None] * d
@@ -237,7 +236,7 @@ def dissipation_by_search(G, c, mu):
         e = energy(g, k, sliding_impulse(g, k, m, x[..., 0]))
         return np.where(np.isnan(e), np.inf, e)
 
-    turn = np.full((len(k), 1), 3.5, dtype=Real)  # beyond pi, so that no minimum lies at an end
+    turn = np.full((len(k), 1), np.pi, dtype=Real)
     angle, _ = search(slide_energy, -turn, turn, points=1441)
     out[slips] = sliding_impulse(g, k, m, angle)[:, 0]
     return out
@@ -246,8 +245,8 @@ def dissipation_by_search(G, c, mu):
 # Certificate --------------------------------------------------------------------------------------------------------
 
 
-def velocity_change(v, r, sticks) -> np.ndarray:
-    """(N,) smallest change of the velocities v (N, 3) that makes the impulses r (N, 3) exact, by search.
+def velocity_change(v, r, sticks):
+    """Smallest change of the velocities v (N, 3) that makes the impulses r (N, 3) exact, by search: (N,) and the change.
 
     Which velocities an impulse allows: without one, those that do not approach; inside the cone (`sticks`), none; on its
     mantle, those along -r_T; without friction (r_T = 0 < r_z), those in the plane.
@@ -256,16 +255,16 @@ def velocity_change(v, r, sticks) -> np.ndarray:
     t, size = norm(r[:, :2]), norm(v)
     e = np.where(t[:, None] > 0, r[:, :2] / np.where(t > 0, t, 1)[:, None], 0)
 
-    def change(x):
+    def allowed(x):
         plane = np.concatenate([x[..., :2], np.zeros_like(x[..., :1])], -1)
-        slide = np.concatenate([-np.maximum(x[..., :1], 0) * e[:, None], np.zeros_like(x[..., :1])], -1)
-        open_ = np.concatenate([x[..., :2], np.maximum(x[..., 2:], 0)], -1)
-        kind = [(r[:, 2] == 0), np.asarray(sticks), t > 0]
-        allowed = np.select([k[:, None, None] for k in kind], [open_, 0 * x, slide], plane)
-        return norm(allowed - v[:, None])
+        slide = np.concatenate([-np.abs(x[..., :1]) * e[:, None], np.zeros_like(x[..., :1])], -1)
+        apart = np.concatenate([x[..., :2], np.abs(x[..., 2:])], -1)
+        kinds = [(r[:, 2] == 0), np.asarray(sticks), t > 0]
+        return np.select([k[:, None, None] for k in kinds], [apart, 0 * x, slide], plane)
 
     box = np.repeat(size[:, None], 3, 1)
-    return search(change, -box, box, points=9, rounds=60, zoom=0.5)[1]
+    x, change = search(lambda x: norm(allowed(x) - v[:, None]), -box, box, points=9, rounds=60, zoom=0.5)
+    return change, allowed(x[:, None])[:, 0] - v
 
 
 def certificate(G, c, mu, impulse) -> dict[str, float]:
