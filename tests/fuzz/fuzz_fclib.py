@@ -4,7 +4,7 @@
 
 runs until it is stopped, or `--count` cases. Case k is made from seed + k alone: `--seed (that sum) --count 1` makes it again. A case
 that fails, hangs or crashes stays in the folder as case_<seed>.hdf5. `--atheris` lets the coverage-guided fuzzer of that name,
-if it is installed, choose the bytes instead.
+if it is installed, choose the bytes instead; other options go to it.
 
 What must hold for every file: `read` and `load` return, or raise ValueError or OSError with the file's path; they take little
 memory, whatever the file claims; what was read can be written and read again; what was loaded is finite.
@@ -27,7 +27,13 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from stickslip import fclib
+if "--atheris" in sys.argv:
+    import atheris
+
+    with atheris.instrument_imports(include=["stickslip.fclib"]):
+        from stickslip import fclib
+else:
+    from stickslip import fclib
 
 Rng = np.random.Generator
 
@@ -332,9 +338,7 @@ def run_case(folder: Path, seed: int, kind: str) -> bool:
     return was_problem
 
 
-def _atheris(folder: Path) -> None:
-    import atheris
-
+def _atheris(folder: Path, rest: list[str]) -> None:
     path = folder / "case_atheris.hdf5"
 
     def one(data: bytes) -> None:
@@ -345,8 +349,7 @@ def _atheris(folder: Path) -> None:
     corpus.mkdir(exist_ok=True)
     for k, content in enumerate(seed_files()):
         (corpus / f"seed_{k}.hdf5").write_bytes(content)
-    atheris.instrument_all()
-    atheris.Setup([sys.argv[0], str(corpus)], one)
+    atheris.Setup([sys.argv[0], *rest, str(corpus)], one)
     atheris.Fuzz()
 
 
@@ -356,13 +359,15 @@ def main() -> None:
     parser.add_argument("--count", type=int, help="cases; without it runs until it is stopped")
     parser.add_argument("--kind", choices=[*MUTATIONS], help="without it both, in turn")
     parser.add_argument("--folder", type=Path, help="for the files; a new temporary one")
-    parser.add_argument("--atheris", action="store_true", help="coverage-guided, until it is stopped")
-    options = parser.parse_args()
+    parser.add_argument("--atheris", action="store_true", help="coverage-guided; other options go to it")
+    options, rest = parser.parse_known_args()
+    if rest and not options.atheris:
+        parser.error(f"unknown: {' '.join(rest)}")
     folder = options.folder or Path(tempfile.mkdtemp(prefix="fuzz_fclib_"))
     folder.mkdir(parents=True, exist_ok=True)
     print(f"files in {folder}", flush=True)
     if options.atheris:
-        _atheris(folder)
+        _atheris(folder, rest)
     problems = 0
     cases = (
         itertools.count(options.seed) if options.count is None else range(options.seed, options.seed + options.count)
