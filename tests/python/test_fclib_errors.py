@@ -204,6 +204,25 @@ def test_what_is_wrong_in_a_global_problem_is_named(tmp_path: Path, change: Call
     assert says in broken(tmp_path / "broken.hdf5", change, global_problem(constraints=2))
 
 
+def test_a_link_that_leads_to_another_file_by_a_detour_is_refused(tmp_path: Path) -> None:
+    fclib.write(tmp_path / "other.hdf5", local_problem())
+
+    def detour(file: h5py.File) -> None:
+        file["away"] = h5py.ExternalLink("other.hdf5", "/fclib_local")
+        del file["fclib_local/W"]
+        file["fclib_local/W"] = h5py.SoftLink("/away/W")
+
+    assert "fclib_local/W is a link to another file" in broken(tmp_path / "a.hdf5", detour)
+
+
+def test_links_within_a_file_are_followed(tmp_path: Path) -> None:
+    fclib.write(tmp_path / "a.hdf5", local_problem())
+    with h5py.File(tmp_path / "a.hdf5", "r+") as file:
+        file.move("fclib_local/W", "elsewhere")
+        file["fclib_local/W"] = h5py.SoftLink("/elsewhere")
+    assert fclib.load(tmp_path / "a.hdf5").num_contacts == 4
+
+
 def test_sums_that_overflow_are_refused(tmp_path: Path) -> None:
     problem = fclib.LocalProblem(np.diag([1e308, 1, 1]), np.zeros(3), [0.5])
 

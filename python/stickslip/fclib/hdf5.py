@@ -107,12 +107,15 @@ class Group:
     def _child(self, child: str) -> h5py.Group | h5py.Dataset | h5py.Datatype:
         with self._reading(child):
             link = self._group.get(child, getlink=True)
-            # A problem is one file: whoever opens it must not be led to others.
-            found = None if isinstance(link, h5py.ExternalLink) else self._group.get(child)
+            # A problem is one file: whoever opens it must not be led to others, in one step or in two.
+            away = isinstance(link, h5py.ExternalLink)
+            found = None if away else self._group.get(child)
+            if isinstance(link, h5py.SoftLink) and found is not None:
+                away = found.file.filename != self._group.file.filename
         if link is None:
             there = ", ".join(self.names()) or "nothing"
             raise self.error(child, f"is missing; there is {there} in {self._name or 'the file'}")
-        if isinstance(link, h5py.ExternalLink):
+        if away:
             raise self.error(child, "is a link to another file; FCLIB problems are one file")
         if found is None:
             raise self.error(child, "is a link to nothing")

@@ -191,7 +191,9 @@ def _without_constraints(problem: LocalProblem, W: sp.csr_array) -> tuple[sp.csr
         raise ValueError(
             f"{error}: redundant or contradictory equality constraints (V, R, s; G, b) cannot be eliminated"
         ) from None
-    return sp.csr_array(W - less), problem.q - shift, says
+    W = sp.csr_array(W - less)
+    W.eliminate_zeros()
+    return W, problem.q - shift, says
 
 
 def _contact_problem(W: sp.csr_array, q: Array, mu: Array, spacedim: int) -> ContactProblem:
@@ -205,7 +207,6 @@ def _contact_problem(W: sp.csr_array, q: Array, mu: Array, spacedim: int) -> Con
 def _delassus(W: sp.csr_array) -> Any:
     """In the form that is solved faster."""
     rows = W.shape[0]
-    W.eliminate_zeros()
     sparse = rows > _SPARSE_ROWS and W.nnz < _SPARSE_DENSITY * rows**2
     if sparse and hasattr(ContactProblem, "is_sparse"):
         return sp.bsr_array(W, blocksize=(3, 3))
@@ -233,6 +234,7 @@ def _matrix(name: str, value: Any, shape: tuple[int, int]) -> sp.csr_array:
     except (TypeError, ValueError) as error:
         raise type(error)(f"{name}: not a matrix of numbers ({error})") from None
     result.sum_duplicates()
+    result.eliminate_zeros()
     bad = np.flatnonzero(~np.isfinite(result.data))
     if len(bad):
         entries = result.tocoo()
