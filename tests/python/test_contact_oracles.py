@@ -46,7 +46,7 @@ def problem_of_any_scale(rng):
 def test_the_residual_is_the_natural_map_in_long_double_at_every_scale():
     rng = np.random.default_rng(1)
     kinds = np.zeros(3, int)
-    for k in range(4000):
+    for k in range(3000):
         G, c, mu, x = problem_of_any_scale(rng)
         e = ss.residual(ss.ContactProblem(G, c, mu), x)
         exact, rounding = oracles.natural_map(G, c, mu, x), oracles.natural_map_rounding(G, c, mu, x)
@@ -56,15 +56,15 @@ def test_the_residual_is_the_natural_map_in_long_double_at_every_scale():
             (np.asarray(scale := oracles.scales(G)) == 0).any(),
             (e > 1e3 * rounding)[scale > 0].any(),
         ]
-    assert (kinds > [1000, 100, 3000]).all(), (
+    assert (kinds > [700, 80, 2200]).all(), (
         kinds
     )  # the sample has what it claims, and most residuals stand out of rounding
 
 
 def test_the_residual_projects_on_the_nearest_point_of_the_cone():
     rng = np.random.default_rng(2)
-    mu = np.where(rng.random(400) < 0.3, rng.choice(EXTREME_FRICTION, 400), 10 ** rng.uniform(-2, 2, 400))
-    z = rng.normal(size=(400, 3))
+    mu = np.where(rng.random(300) < 0.3, rng.choice(EXTREME_FRICTION, 300), 10 ** rng.uniform(-2, 2, 300))
+    z = rng.normal(size=(300, 3))
     z[: len(z) // 4, 2] *= 1e-3
     point, distance = oracles.project_by_search(mu, z)
     assert np.abs(norm(z - oracles.project(mu, z)) - distance).max() < 1e-15
@@ -73,7 +73,7 @@ def test_the_residual_projects_on_the_nearest_point_of_the_cone():
     for m, x, d in zip(mu, z, distance, strict=True):
         e = ss.residual(ss.ContactProblem(np.eye(3), -x, [m]), x)[0]
         assert abs(e - d) <= 8 * oracles.UNIT * (1 + norm(x)), (m, x, e, d)
-    assert (distance < 1e-15).sum() > 40 and (distance > 0.1).sum() > 100
+    assert (distance < 1e-15).sum() > 30 and (distance > 0.1).sum() > 100
 
 
 @pytest.mark.parametrize("family", oracles.FAMILIES)
@@ -115,11 +115,18 @@ def test_maximum_dissipation_is_the_conic_program(family):
     G, c, mu = oracles.single_contacts(np.random.default_rng(5), family, 600)
     searched = oracles.dissipation_by_search(G, c, mu)
     accuracy = 1e-6 if family == "ill-conditioned" else 1e-8  # of a search among energies
-    finished = 0
+    finished = failed = 0
     for g, k, m, s in zip(G, c, mu, searched, strict=True):
         p, speed = ss.ContactProblem(g, k, [m]), norm(k)
         x = ss.solve_contact(g, k, m, law="max_dissipation", tolerance=1e-13)
         assert norm(g @ (x - s)) <= accuracy * speed
+        for method, looser in {"bisection": 1, "golden_section": 100, "quartic": 1}.items():
+            try:
+                y = ss.solve_contact(g, k, m, law="max_dissipation", method=method, tolerance=1e-11 * looser**2)
+                assert norm(g @ (y - s)) <= looser * accuracy * speed, (method, g, k, m)
+            except ArithmeticError:
+                assert method != "bisection"  # the others may fail, and say so
+                failed += 1
         assert ss.residual(p, s, law="max_dissipation")[0] <= accuracy * speed
         if k[2] >= 0:
             assert not x.any()
@@ -131,6 +138,7 @@ def test_maximum_dissipation_is_the_conic_program(family):
         assert abs(ss.residual(p, conic, law="max_dissipation")[0] / speed - apart) <= 1e-11 + 1e-15 * norm(
             conic
         ) * np.trace(g)
+    assert failed <= 0.25 * len(c)
     assert finished > 0.9 * (c[:, 2] < 0).sum()
 
 
@@ -181,8 +189,83 @@ def test_the_convex_model_solves_coulombs_law_for_the_shifted_velocity(scene):
             float(oracles.natural_map(G, shifted, mu, s.impulse).max()), abs=1e-13 * speed
         )
         same += np.abs(s.velocity - G @ r - shifted).max() <= 1e-8 * speed
-    print(scene, exact, solved, same)
     assert exact >= 0.9 * count
     assert solved == exact
     # Coulomb's law may have several solutions where body corners and feet share the load; few problems do.
     assert same >= 0.9 * exact
+
+
+def impulses_on_the_cone(rng, mu: np.ndarray):
+    """(n, 3) impulses and whether each lies inside its cone: nothing, inside, and on the mantle."""
+    n = len(mu)
+    kind, angle, z = rng.integers(3, size=n), rng.uniform(-np.pi, np.pi, n), rng.uniform(0.1, 2, n)
+    share = np.where(kind == 1, rng.uniform(0, 0.99, n), 1)
+    t = np.minimum(mu, 1e4) * z * share
+    x = np.stack([t * np.cos(angle), t * np.sin(angle), z], 1) * (kind > 0)[:, None]
+    return x, (kind == 1) & (mu > 0)
+
+
+@pytest.mark.xfail(not hasattr(ss, "certify"), raises=AttributeError, strict=True, reason="certify is yet to come")
+def test_the_backward_error_is_the_smallest_change_of_velocity_that_makes_an_impulse_exact():
+    rng = np.random.default_rng(8)
+    cases = []
+    for _ in range(80):
+        n = int(rng.integers(1, 5))
+        Y = rng.normal(size=(3 * n, int(rng.integers(1, 3 * n + 3))))
+        mu = np.where(rng.random(n) < 0.25, rng.choice([0, 1e4, 1e6, np.inf], n), rng.uniform(0.05, 2, n))
+        x, sticks = impulses_on_the_cone(rng, mu)
+        p = ss.ContactProblem(Y @ Y.T, rng.normal(size=3 * n) * 3, mu)
+        certificate = ss.certify(p, x.reshape(-1))
+        v = oracles.velocities(p.delassus, p.free_velocity, x.reshape(-1))
+        assert certificate.backward_error == certificate.backward_errors.max()
+        # The natural map is nonexpansive in v + mu |v_T| z.
+        bound = (1 + np.minimum(mu, 1e4)) * certificate.backward_errors
+        rounding = 4 * oracles.natural_map_rounding(p.delassus, p.free_velocity, mu, x.reshape(-1))
+        assert (certificate.residuals <= bound + rounding).all()
+        cases.append((certificate.backward_errors, v, x, sticks, mu))
+    error, v, x, sticks, mu = (np.concatenate(a) for a in zip(*cases, strict=True))
+    expected, change = oracles.velocity_change(v, x, sticks)
+    assert np.abs(error - expected).max() <= 1e-13 * (1 + norm(x) * mu.clip(max=1e4)).max()
+    # With that change the impulse is exact, with any smaller one it is not.
+    identity, rng = np.eye(3), np.random.default_rng(9)
+    for w, d, r, m, e in zip(v, change, x, mu, error, strict=True):
+        rounding = 1e-13 * (1 + norm(r) + norm(w)) * (1 + min(m, 1e4))
+        assert oracles.natural_map(identity, w + d - r, [m], r)[0] <= rounding
+        other = rng.normal(size=(5, 3))
+        for k in 0.9 * e * other / norm(other)[:, None]:
+            assert e < 1e-6 or oracles.natural_map(identity, w + k - r, [m], r)[0] > rounding
+
+
+@pytest.mark.xfail(not hasattr(ss, "certify"), raises=AttributeError, strict=True, reason="certify is yet to come")
+def test_the_numbers_of_a_certificate_are_their_definitions():
+    rng = np.random.default_rng(10)
+    for _ in range(1000):
+        G, c, mu, x = problem_of_any_scale(rng)
+        certificate = ss.certify(ss.ContactProblem(G, c, mu), x)
+        size = np.abs(np.asarray(G)) @ np.abs(x) + np.abs(c)
+        m = np.minimum(mu, 1e4)
+        # Velocities are sums of 3 n + 1 terms; power is their product with impulses, friction speeds counted mu times.
+        rounding = {
+            "penetration_speed": 20 * oracles.UNIT * size.max(),
+            "cone_violation": 8 * oracles.UNIT * (np.abs(x).reshape(-1, 3).max(1) * (1 + m)).max(),
+            "power": 60
+            * oracles.UNIT
+            * ((1 + m) * (np.abs(x) * 1).reshape(-1, 3).max(1) * size.reshape(-1, 3).max(1)).max(),
+        }
+        expected = oracles.certificate(G, c, mu, x)
+        for name, allowed in rounding.items():
+            assert abs(getattr(certificate, name) - expected[name]) <= allowed, (name, certificate, expected)
+        np.testing.assert_array_equal(certificate.residuals, ss.residual(ss.ContactProblem(G, c, mu), x))
+        assert certificate.residual == certificate.residuals.max()
+
+
+@pytest.mark.xfail(not hasattr(ss, "certify"), raises=AttributeError, strict=True, reason="certify is yet to come")
+def test_the_direction_error_is_the_angle_between_friction_and_the_opposite_of_sliding():
+    rng = np.random.default_rng(11)
+    for _ in range(500):
+        G, c, mu = oracles.robot(rng, feet=int(rng.integers(1, 5)))
+        x = np.abs(rng.normal(size=3 * len(mu)))
+        certificate = ss.certify(ss.ContactProblem(G, c, mu), x)
+        expected = oracles.certificate(G, c, mu, x)["direction_error"]
+        assert certificate.direction_error == pytest.approx(expected, abs=1e-12)
+        assert 0 <= certificate.direction_error <= np.pi

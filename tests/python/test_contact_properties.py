@@ -6,6 +6,8 @@ matter (order of contacts, units, directions of the tangential axes) and expects
 
 from __future__ import annotations
 
+import inspect
+
 import hypothesis
 import numpy as np
 import pytest
@@ -33,12 +35,20 @@ def problems(draw):
         Y[1::3] = 0
     if draw(st.integers(0, 7)) == 0:  # rows that nothing moves
         Y[rng.random(3 * n) < 0.3] = 0
-    kind = draw(st.sampled_from(["in the range", "in the range", "any", "zero"]))
+    kind = draw(st.sampled_from(["in the range"] * 4 + ["any"] * 2 + ["zero"]))
     c = {"in the range": Y @ rng.normal(size=rank), "any": rng.normal(size=3 * n), "zero": np.zeros(3 * n)}[kind]
+    c *= -1 if c[2::3].sum() > 0 else 1  # most problems push
     mass, length, time = (10 ** draw(st.sampled_from([-12, -6, -1, 0, 0, 0, 1, 6, 12])) for _ in range(3))
     G = Y @ Y.T / mass
     mu = np.array([draw(FRICTION) for _ in range(n)]) if draw(st.booleans()) else np.full(n, draw(FRICTION))
     return ss.ContactProblem((G + G.T) / 2, c * (length / time), mu)
+
+
+def solve_to(p: ss.ContactProblem, tolerance: float, relative: float, **options) -> ss.ContactSolution:
+    """Solves until the residual is at most tolerance + relative max|c|."""
+    if "relative_tolerance" in inspect.signature(ss.solve).parameters:
+        return ss.solve(p, tolerance=tolerance, relative_tolerance=relative, **options)
+    return ss.solve(p, tolerance=tolerance + relative * np.abs(p.free_velocity).max(), **options)
 
 
 def laws_of(method: str) -> list[str]:
@@ -84,12 +94,12 @@ def check_max_dissipation(p: ss.ContactProblem, s: ss.ContactSolution, limit: fl
     choice=st.sampled_from(CHOICES),
     limits=st.sampled_from(LIMITS),
 )
-@hypothesis.settings(max_examples=1500, deadline=None, derandomize=True)
+@hypothesis.settings(max_examples=1200, deadline=None, derandomize=True)
 def test_every_method_answers_every_problem_with_a_true_status(p, choice, limits):
     method, law = choice
     tolerance, relative = limits
     limit = tolerance + relative * np.abs(p.free_velocity).max()
-    s = ss.solve(p, method=method, law=law, tolerance=limit, max_sweeps=100)
+    s = solve_to(p, tolerance, relative, method=method, law=law, max_sweeps=100)
     for a in (s.impulse, s.velocity, s.contact_residuals, [s.residual]):
         assert np.isfinite(a).all()
     check_cones(p, s.impulse)
@@ -140,7 +150,7 @@ SCENES = {
 
 
 def solved(G, c, mu, **options):
-    return ss.solve(ss.ContactProblem(G, c, mu), tolerance=1e-12 * np.abs(c).max(), **options)
+    return solve_to(ss.ContactProblem(G, c, mu), 1e-300, 1e-12, **options)
 
 
 @pytest.mark.parametrize("change", [permuted, turned, in_other_units])
@@ -191,7 +201,5 @@ def test_asking_for_more_does_not_give_less():
     rng = np.random.default_rng(3)
     for _ in range(20):
         p = ss.ContactProblem(*oracles.stack(rng, 3, ratio=100))
-        relative = [
-            ss.solve(p, tolerance=r * np.abs(p.free_velocity).max()).residual for r in (1e-6, 1e-8, 1e-10, 1e-12)
-        ]
+        relative = [solve_to(p, 1e-300, r).residual for r in (1e-6, 1e-8, 1e-10, 1e-12)]
         assert max(relative[1:]) <= relative[0] + 1e-6 * np.abs(p.free_velocity).max()
