@@ -106,6 +106,9 @@ def test_every_method_answers_every_problem_with_a_true_status(p, choice, limits
     np.testing.assert_array_equal(s.contact_residuals, ss.residual(p, s.impulse, law=law))
     assert s.residual == s.contact_residuals.max()
     assert s.converged == (s.residual <= limit) == (s.status == "converged")
+    if s.status == "infeasible":
+        blocks = np.diagonal(p.delassus).reshape(-1, 3)
+        assert ((blocks[:, 2] <= 1e-12 * blocks.sum(1)) & (s.velocity[2::3] < 0)).any()
     if law == "max_dissipation":
         if s.converged:
             check_max_dissipation(p, s, limit)
