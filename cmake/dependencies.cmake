@@ -1,5 +1,7 @@
 # Third-party libraries, all from Python wheels; nothing is installed on the system.
 #
+# stickslip_eigen: Eigen's headers from the wheel cmeel-eigen.
+#
 # stickslip_urdfdom: urdfdom, its headers, tinyxml2 and console_bridge from the wheels cmeel-urdfdom[build]. cmeel puts them
 # under <site-packages>/cmeel.prefix. Searched, in this order: STICKSLIP_CMEEL_PREFIX, every entry of CMAKE_PREFIX_PATH
 # (where scikit-build-core lists the site-packages of its isolated build environment), the interpreter's sys.path. Nothing of
@@ -40,7 +42,7 @@ stickslip_cmeel_candidates(candidates)
 set(cmeel_prefix "")
 foreach(candidate IN LISTS candidates)
   if(EXISTS "${candidate}/lib/liburdfdom_model.so" AND EXISTS "${candidate}/include/tinyxml2.h"
-     AND EXISTS "${candidate}/include/urdfdom_headers/urdf_model/model.h")
+     AND EXISTS "${candidate}/include/urdfdom_headers/urdf_model/model.h" AND EXISTS "${candidate}/include/eigen3/Eigen/Core")
     set(cmeel_prefix "${candidate}")
     break()
   endif()
@@ -49,11 +51,11 @@ if(NOT cmeel_prefix)
   list(REMOVE_DUPLICATES candidates)
   list(JOIN candidates "\n  " candidates)
   message(FATAL_ERROR
-    "urdfdom was not found. Install it with\n  ${Python_EXECUTABLE} -m pip install 'cmeel-urdfdom[build]>=6,<7'\n"
+    "urdfdom and Eigen were not found. Install them with\n  ${Python_EXECUTABLE} -m pip install 'cmeel-urdfdom[build]>=6,<7' 'cmeel-eigen>=3.4'\n"
     "or pass -DPython_EXECUTABLE=<the interpreter that has it> or -DSTICKSLIP_CMEEL_PREFIX=<its cmeel.prefix>. "
     "Looked in:\n  ${candidates}")
 endif()
-message(STATUS "urdfdom: ${cmeel_prefix}")
+message(STATUS "urdfdom, Eigen: ${cmeel_prefix}")
 
 add_library(stickslip_urdfdom INTERFACE)
 foreach(name urdfdom_model tinyxml2 console_bridge)
@@ -67,3 +69,9 @@ file(COPY "${cmeel_prefix}/include/tinyxml2.h" "${cmeel_prefix}/include/console_
   DESTINATION "${CMAKE_BINARY_DIR}/urdfdom_include")
 target_include_directories(stickslip_urdfdom SYSTEM INTERFACE
   "${CMAKE_BINARY_DIR}/urdfdom_include" "${cmeel_prefix}/include/urdfdom" "${cmeel_prefix}/include/urdfdom_headers")
+
+# stickslip_eigen: linear algebra beyond robot size (header only).
+file(COPY "${cmeel_prefix}/include/eigen3" DESTINATION "${CMAKE_BINARY_DIR}")
+add_library(stickslip_eigen INTERFACE)
+target_include_directories(stickslip_eigen SYSTEM INTERFACE "${CMAKE_BINARY_DIR}/eigen3")
+target_compile_definitions(stickslip_eigen INTERFACE EIGEN_MPL2_ONLY EIGEN_DONT_PARALLELIZE)

@@ -23,19 +23,45 @@ enum class SingleContactMethod {
   kQuartic,        ///< closed form of the quartic; fails now and then, and says so
 };
 
-/// Method for several contacts.
+/// Method for several contacts (docs/theory/contact.md, sections 4, 5 and 7).
 enum class SolveMethod {
-  kAuto,        ///< warm-started sweeps, one Halley step per visit, Newton finish; the default
-  kPerContact,  ///< [Hwangbo 2018] Algorithm 2
-  kPgs,         ///< projected Gauss-Seidel, [Hwangbo 2018] eq. 17, 18
+  kAuto,           ///< the chain: sweeps, Newton steps, interior point, ADMM; the default
+  kPerContact,     ///< [Hwangbo 2018] Algorithm 2
+  kPgs,            ///< projected Gauss-Seidel, [Hwangbo 2018] eq. 17, 18
+  kProxNewton,     ///< proximal point method with semismooth Newton steps, [Alart 1991]
+  kInteriorPoint,  ///< primal-dual interior point on the friction cones, [Acary 2023]
+  kAdmm,           ///< alternating directions with De Saxce's shift, [Carpentier 2024]
 };
 
-/// How a solve ended. Anything but kConverged returns the best impulse found, with its residual.
+/// What found the impulse that a solve returns.
+enum class SolveStage {
+  kStart,          ///< the warm start, or rest
+  kSweeps,         ///< per-contact sweeps or PGS
+  kNewton,         ///< Newton finish of the sweeps
+  kProxNewton,     ///< proximal Newton steps
+  kInteriorPoint,  ///< interior point
+  kAdmm,           ///< ADMM
+};
+
+/// How a solve ended. Whatever the status, the impulse returned is the best one found, inside its
+/// cones, and the certificate says how good it is.
 enum class SolveStatus {
-  kConverged,     ///< the largest contact residual is at most the tolerance
-  kNotConverged,  ///< cause: sweeps or steps used up; the residual says how far; raise max_sweeps
-                  ///< or use kAuto
-  kInfeasible,    ///< a contact cannot push (G_zz near 0) and its normal velocity stays negative
+  /// Cause: the residual is at most the tolerance. Consequence: the impulse is the exact answer to a
+  /// problem whose contact velocities differ by the certificate's backward error. Remedy: none
+  /// needed.
+  kConverged,
+  /// Cause: a method chosen by name used up max_sweeps or max_iterations. Consequence: the laws hold
+  /// up to the residual only. Remedy: raise the limit, or use kAuto.
+  kIterationLimit,
+  /// Cause: every stage ended above the tolerance: it lies below the rounding of the problem, or
+  /// friction jams (Painleve) and no finite impulse exists, or the problem is harder than the methods.
+  /// Consequence: as above. Remedy: compare the residual with 1e-16 times the largest G_ii |lambda_i|;
+  /// check friction and geometry; in a simulation halve the step.
+  kStalled,
+  /// Cause: a contact cannot push (G_zz near 0: its body is held along the normal) and is driven in.
+  /// Consequence: no impulse keeps it from sinking; all other contacts are solved as far as the
+  /// residuals say. Remedy: drop the contact, or let its body move.
+  kInfeasible,
 };
 
 /// What ends the sweeps of kPerContact and kPgs, once it is at most the tolerance.
@@ -47,17 +73,20 @@ enum class StopTest {
                ///< kPgs
 };
 
-/// A dense contact problem. `delassus` is row-major (3n, 3n) [1/kg], symmetric positive
-/// semidefinite; `free_velocity` (3n) [m/s]; `friction` (n) [1], zero or positive; infinite and
-/// huge values count as 1e4.
+/// A contact problem, dense or block sparse. Dense: `delassus` is row-major (3n, 3n). Block sparse (where
+/// `block_starts` is not empty): `delassus` holds k blocks, each row-major (3, 3), both triangles, in
+/// the layout of SciPy's BSR with sorted columns; blocks that are not stored are zero.
 struct ContactProblem {
-  std::vector<double> delassus;       ///< (3n, 3n) row-major [1/kg]
+  std::vector<double> delassus;       ///< (3n, 3n) or (k, 3, 3), symmetric semidefinite [1/kg]
   std::vector<double> free_velocity;  ///< (3n) [m/s]
-  std::vector<double> friction;       ///< (n) [1]
+  std::vector<double> friction;  ///< (n) [1], not negative; infinite and huge values count as 1e4
+  std::vector<int> block_starts{};   ///< (n + 1): blocks of row i are starts[i] .. starts[i + 1] - 1
+  std::vector<int> block_columns{};  ///< (k): column of each block, ascending within a row
   /// n, as many as `friction` has.
   int num_contacts() const { return static_cast<int>(friction.size()); }
+  bool is_block_sparse() const { return !block_starts.empty(); }
   /// Throws ModelError that names the argument and its first offending index (lengths, NaN,
-  /// asymmetry, negative diagonal, indefinite matrix, negative friction).
+  /// asymmetry, negative diagonal, indefinite matrix, negative friction, indices of blocks).
   void validate() const;
 };
 
@@ -65,9 +94,18 @@ struct ContactProblem {
 struct SolveOptions {
   SolveMethod method = SolveMethod::kAuto;
   FrictionLaw law = FrictionLaw::kCoulomb;  ///< kPgs knows kCoulomb only
-  double tolerance =
-      1e-9;  ///< on the largest contact residual [m/s], or on the sum that `stop` names
-  int max_sweeps = 1000;  ///< >= 1; kAuto: of each of its stages
+  /// On the largest contact residual [m/s], or on the sum that `stop` names; not negative.
+  double tolerance = 1e-9;
+  /// Added to it: this much of the largest |free velocity|; not negative. One of the two is positive.
+  double relative_tolerance = 0;
+  int max_sweeps = 1000;   ///< >= 1; kAuto: of each of its sweep stages
+  int max_iterations = 0;  ///< Newton, interior-point or ADMM steps of a method chosen by name, >= 0;
+                           ///< 0: 500, 100 or 5000
+  /// Among impulses with the same velocity, the one with the least tangential part (redundant
+  /// contacts leave a choice: feet that press against each other). kCoulomb only.
+  bool minimum_norm = false;
+  /// kProxNewton: proximal weight of the first subproblem, relative to G_ii; > 0.
+  double proximal_weight = 1e-3;
   /// kPerContact only. kGoldenSection minimizes an energy, so it knows kMaxDissipation only.
   SingleContactMethod single_contact = SingleContactMethod::kHalley;
   double single_contact_tolerance =
@@ -82,18 +120,41 @@ struct SolveOptions {
   void validate() const;        ///< throws ModelError that names the option
 };
 
+/// How good an impulse is, from the problem and the impulse alone (docs/theory/contact.md, section 8).
+/// Velocities are v = G impulse + c.
+struct Certificate {
+  std::vector<double> residuals;        ///< (n) residual of each contact [m/s], see `residual`
+  std::vector<double> backward_errors;  ///< (n) the least change of the contact's velocity that makes
+                                        ///< its impulse exact under Coulomb's law [m/s]
+  double residual = 0;                  ///< the largest [m/s]
+  double backward_error = 0;            ///< the largest [m/s]
+  double penetration_speed = 0;         ///< the largest -v_z, or 0 [m/s]
+  double cone_violation = 0;            ///< the largest |lambda_T| - mu lambda_z, or 0 [N s]
+  /// The largest angle between the friction of a sliding contact and the direction against its
+  /// sliding [rad]; contacts slower than 1e-6 of the largest |c|, or that hardly push, do not count.
+  double direction_error = 0;
+  double power = 0;  ///< the largest |lambda . (v + mu |v_T| z)|, zero at a solution [J]
+};
+
+/// One point of a solve's history.
+struct HistoryEntry {
+  SolveStage stage;
+  double time;      ///< since the solve began [s]
+  double residual;  ///< of the impulse at that point, projected on its cones [m/s]
+};
+
 /// What a solve returns: the best impulse found, with its certificate.
 struct SolveResult {
-  std::vector<double> impulse;            ///< (3n) [N s]
-  std::vector<double> velocity;           ///< G impulse + c (3n) [m/s]
-  std::vector<double> contact_residuals;  ///< (n) [m/s]
-  double residual = 0;                    ///< the largest of them [m/s]
+  std::vector<double> impulse;   ///< (3n) [N s]
+  std::vector<double> velocity;  ///< G impulse + c (3n) [m/s]
+  Certificate certificate;
+  SolveStage stage = SolveStage::kStart;  ///< what found it
   int sweeps = 0;                         ///< passes over all contacts
-  int newton_steps = 0;                   ///< kAuto: of the finish and the fallback
-  SolveStatus status = SolveStatus::kNotConverged;
-  /// If recorded: the value of the stop test after each sweep; kAuto: the residual after each
-  /// stage.
-  std::vector<double> history;
+  int newton_steps = 0;                   ///< of the Newton finish and of proximal Newton
+  int interior_point_steps = 0;
+  int admm_iterations = 0;
+  SolveStatus status = SolveStatus::kStalled;
+  std::vector<HistoryEntry> history;  ///< if recorded: one entry per sweep, step or iteration
 };
 
 /// Solves a problem; `warm_start` is empty or (3n). Throws only for bad input (see `validate`).
@@ -106,6 +167,10 @@ SolveResult solve(const ContactProblem& problem, const SolveOptions& options = {
 /// with the others held. Throws ModelError for bad input.
 std::vector<double> residual(const ContactProblem& problem, const std::vector<double>& impulse,
                              FrictionLaw law = FrictionLaw::kCoulomb);
+
+/// Certificate of any impulse (3n); a pure function of its arguments. Throws ModelError for bad input.
+Certificate certify(const ContactProblem& problem, const std::vector<double>& impulse,
+                    FrictionLaw law = FrictionLaw::kCoulomb);
 
 /// How to solve one contact.
 struct SingleContactOptions {

@@ -23,56 +23,107 @@ constexpr Word<StopTest> kStopTests[] = {
 };
 constexpr Word<SolveStatus> kSolveStatuses[] = {
     {"converged", SolveStatus::kConverged},
-    {"not_converged", SolveStatus::kNotConverged},
+    {"iteration_limit", SolveStatus::kIterationLimit},
+    {"stalled", SolveStatus::kStalled},
     {"infeasible", SolveStatus::kInfeasible},
+};
+constexpr Word<SolveStage> kSolveStages[] = {
+    {"start", SolveStage::kStart},
+    {"sweeps", SolveStage::kSweeps},
+    {"newton", SolveStage::kNewton},
+    {"prox_newton", SolveStage::kProxNewton},
+    {"interior_point", SolveStage::kInteriorPoint},
+    {"admm", SolveStage::kAdmm},
 };
 
 std::vector<double> vector_of(const VectorIn& a) { return {a.data(), a.data() + a.size()}; }
 
-ContactProblem problem_of(const VectorIn& delassus, const VectorIn& free_velocity,
-                          const VectorIn& friction) {
-  return {vector_of(delassus), vector_of(free_velocity), vector_of(friction)};
-}
-
-void validate_problem(const VectorIn& delassus, const VectorIn& free_velocity,
-                      const VectorIn& friction) {
-  problem_of(delassus, free_velocity, friction).validate();
-}
-
-/// (impulse, velocity, contact residuals, residual, sweeps, Newton steps, status, history).
-nb::tuple solve_problem(const VectorIn& delassus, const VectorIn& free_velocity,
-                        const VectorIn& friction, const VectorIn& impulse,
-                        const std::string& method, const std::string& law, double tolerance,
-                        int max_sweeps, const std::string& single_contact,
-                        double single_contact_tolerance, double alpha, double alpha_min,
-                        double gamma, const std::string& stop, bool history) {
+/// Whether something given as a word may be used with a law is for the core to say.
+SolveOptions options_of(const nb::dict& d) {
   SolveOptions o;
-  o.method = choice("method", method, kSolveMethods);
-  o.law = choice("law", law, kFrictionLaws);
-  o.tolerance = tolerance, o.max_sweeps = max_sweeps;
-  o.single_contact = choice("single_contact", single_contact, kSingleContactMethods);
-  o.single_contact_tolerance = single_contact_tolerance;
-  o.alpha = alpha, o.alpha_min = alpha_min, o.gamma = gamma;
-  o.stop = choice("stop", stop, kStopTests);
-  o.record_history = history;
-  const ContactProblem problem = problem_of(delassus, free_velocity, friction);
-  const std::vector<double> start = vector_of(impulse);
-  SolveResult r;
-  {
-    nb::gil_scoped_release free_interpreter;
-    r = solve(problem, o, start);
-  }
-  return nb::make_tuple(copy_array(r.impulse), copy_array(r.velocity),
-                        copy_array(r.contact_residuals), r.residual, r.sweeps, r.newton_steps,
-                        word_for(r.status, kSolveStatuses), copy_array(r.history));
+  const auto text = [&d](const char* key) { return nb::cast<std::string>(d[key]); };
+  o.method = choice("method", text("method"), kSolveMethods);
+  o.law = choice("law", text("law"), kFrictionLaws);
+  o.tolerance = nb::cast<double>(d["tolerance"]);
+  o.relative_tolerance = nb::cast<double>(d["relative_tolerance"]);
+  o.max_sweeps = nb::cast<int>(d["max_sweeps"]);
+  o.max_iterations = nb::cast<int>(d["max_iterations"]);
+  o.minimum_norm = nb::cast<bool>(d["minimum_norm"]);
+  o.proximal_weight = nb::cast<double>(d["proximal_weight"]);
+  o.single_contact = choice("single_contact", text("single_contact"), kSingleContactMethods);
+  o.single_contact_tolerance = nb::cast<double>(d["single_contact_tolerance"]);
+  o.alpha = nb::cast<double>(d["alpha"]);
+  o.alpha_min = nb::cast<double>(d["alpha_min"]);
+  o.gamma = nb::cast<double>(d["gamma"]);
+  o.stop = choice("stop", text("stop"), kStopTests);
+  o.record_history = nb::cast<bool>(d["history"]);
+  return o;
 }
 
-ArrayOut problem_residual(const VectorIn& delassus, const VectorIn& free_velocity,
-                          const VectorIn& friction, const VectorIn& impulse,
-                          const std::string& law) {
-  return copy_array(residual(problem_of(delassus, free_velocity, friction), vector_of(impulse),
-                             choice("law", law, kFrictionLaws)));
+nb::dict dict_of(const Certificate& c) {
+  nb::dict d;
+  d["residuals"] = copy_array(c.residuals);
+  d["backward_errors"] = copy_array(c.backward_errors);
+  d["residual"] = c.residual;
+  d["backward_error"] = c.backward_error;
+  d["penetration_speed"] = c.penetration_speed;
+  d["cone_violation"] = c.cone_violation;
+  d["direction_error"] = c.direction_error;
+  d["power"] = c.power;
+  return d;
 }
+
+nb::dict dict_of(const SolveResult& r) {
+  std::vector<double> time, residual;
+  nb::list stages;
+  for (const HistoryEntry& h : r.history) {
+    time.push_back(h.time);
+    residual.push_back(h.residual);
+    stages.append(word_for(h.stage, kSolveStages));
+  }
+  nb::dict d, history;
+  history["stage"] = stages;
+  history["time"] = copy_array(time);
+  history["residual"] = copy_array(residual);
+  d["impulse"] = copy_array(r.impulse);
+  d["velocity"] = copy_array(r.velocity);
+  d["certificate"] = dict_of(r.certificate);
+  d["stage"] = word_for(r.stage, kSolveStages);
+  d["sweeps"] = r.sweeps;
+  d["newton_steps"] = r.newton_steps;
+  d["interior_point_steps"] = r.interior_point_steps;
+  d["admm_iterations"] = r.admm_iterations;
+  d["status"] = word_for(r.status, kSolveStatuses);
+  d["history"] = history;
+  return d;
+}
+
+/// A checked problem, kept by the Python object, so that it is copied and checked once.
+class CheckedProblem {
+ public:
+  CheckedProblem(const VectorIn& delassus, const VectorIn& free_velocity, const VectorIn& friction,
+                 const std::vector<int>& block_starts, const std::vector<int>& block_columns)
+      : problem_{vector_of(delassus), vector_of(free_velocity), vector_of(friction), block_starts,
+                 block_columns} {
+    problem_.validate();
+  }
+  nb::dict solve(const VectorIn& impulse, const nb::dict& options) const {
+    const SolveOptions o = options_of(options);
+    const std::vector<double> start = vector_of(impulse);
+    SolveResult r;
+    {
+      nb::gil_scoped_release free_interpreter;
+      r = stickslip::solve(problem_, o, start);
+    }
+    return dict_of(r);
+  }
+  nb::dict certify(const VectorIn& impulse, const std::string& law) const {
+    return dict_of(stickslip::certify(problem_, vector_of(impulse), choice("law", law, kFrictionLaws)));
+  }
+
+ private:
+  ContactProblem problem_;
+};
 
 /// (impulse (3,), evaluations, converged); delassus (9,), free velocity (3,).
 nb::tuple solve_single(const VectorIn& delassus, const VectorIn& free_velocity, double friction,
@@ -117,13 +168,12 @@ nb::list time_single_contact(const VectorIn& delassus, const VectorIn& free_velo
 }  // namespace
 
 void bind_contact(nb::module_& m) {
-  m.def("validate_contact_problem", &validate_problem, "delassus"_a, "free_velocity"_a,
-        "friction"_a);
-  m.def("solve_contact_problem", &solve_problem, "delassus"_a, "free_velocity"_a, "friction"_a,
-        "impulse"_a, "method"_a, "law"_a, "tolerance"_a, "max_sweeps"_a, "single_contact"_a,
-        "single_contact_tolerance"_a, "alpha"_a, "alpha_min"_a, "gamma"_a, "stop"_a, "history"_a);
-  m.def("contact_problem_residual", &problem_residual, "delassus"_a, "free_velocity"_a,
-        "friction"_a, "impulse"_a, "law"_a);
+  nb::class_<CheckedProblem>(m, "CheckedProblem")
+      .def(nb::init<const VectorIn&, const VectorIn&, const VectorIn&, const std::vector<int>&,
+                    const std::vector<int>&>(),
+           "delassus"_a, "free_velocity"_a, "friction"_a, "block_starts"_a, "block_columns"_a)
+      .def("solve", &CheckedProblem::solve, "impulse"_a, "options"_a)
+      .def("certify", &CheckedProblem::certify, "impulse"_a, "law"_a);
   m.def("solve_single_contact", &solve_single, "delassus"_a, "free_velocity"_a, "friction"_a,
         "method"_a, "law"_a, "tolerance"_a);
   m.def("_time_single_contact", &time_single_contact, "delassus"_a, "free_velocity"_a, "friction"_a,

@@ -82,7 +82,7 @@ void init_world(World* self, double time_step, const Vector3& gravity,
   options.gravity = gravity;
   options.integrator = choice("integrator", integrator, kIntegrators);
   options.max_substeps = max_substeps;
-  options.solver.method = choice("method", method, kSolveMethods);
+  options.solver.method = choice("method", method, kStepMethods);
   options.solver.law = choice("law", law, kFrictionLaws);
   options.solver.single_contact = choice("single_contact", single_contact, kSingleContactMethods);
   options.solver.tolerance = tolerance;

@@ -29,6 +29,15 @@ inline constexpr Word<SolveMethod> kSolveMethods[] = {
     {"auto", SolveMethod::kAuto},
     {"per_contact", SolveMethod::kPerContact},
     {"pgs", SolveMethod::kPgs},
+    {"prox_newton", SolveMethod::kProxNewton},
+    {"interior_point", SolveMethod::kInteriorPoint},
+    {"admm", SolveMethod::kAdmm},
+};
+/// Those that a world may use in its steps.
+inline constexpr Word<SolveMethod> kStepMethods[] = {
+    {"auto", SolveMethod::kAuto},
+    {"per_contact", SolveMethod::kPerContact},
+    {"pgs", SolveMethod::kPgs},
 };
 inline constexpr Word<Integrator> kIntegrators[] = {
     {"energy_safe", Integrator::kEnergySafe},

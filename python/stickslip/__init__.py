@@ -12,12 +12,21 @@ _cpu.check()
 
 from stickslip import assets  # noqa: E402
 from stickslip._core import Model, ModelBuilder, ModelError, Pose, load_urdf, parse_urdf  # noqa: E402
-from stickslip.contact import ContactProblem, ContactSolution, residual, solve, solve_contact  # noqa: E402
+from stickslip.contact import (  # noqa: E402
+    Certificate,
+    ContactProblem,
+    ContactSolution,
+    certify,
+    residual,
+    solve,
+    solve_contact,
+)
 from stickslip.world import Contact, Robot, SolveInfo, StepError, StepStatus, World  # noqa: E402
 
 __version__ = _version("stickslip")
 
 __all__ = [
+    "Certificate",
     "Contact",
     "ContactProblem",
     "ContactSolution",
@@ -31,6 +40,7 @@ __all__ = [
     "StepStatus",
     "World",
     "assets",
+    "certify",
     "load_urdf",
     "parse_urdf",
     "residual",

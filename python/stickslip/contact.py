@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,37 +16,81 @@ from numpy.typing import ArrayLike, NDArray
 from stickslip import _core
 from stickslip._arguments import array, count, number
 
+if TYPE_CHECKING:
+    from scipy import sparse
+
 Law = Literal["coulomb", "max_dissipation"]
 SingleContactMethod = Literal["halley", "bisection", "golden_section", "quartic"]
+SolveMethod = Literal["auto", "per_contact", "pgs", "prox_newton", "interior_point", "admm"]
+Stage = Literal["start", "sweeps", "newton", "prox_newton", "interior_point", "admm"]
 Array = NDArray[np.float64]
+
+#: The methods of `solve`.
+SOLVE_METHODS: tuple[SolveMethod, ...] = get_args(SolveMethod)
 
 
 class ContactProblem:
-    """A dense contact problem.
+    """A contact problem, dense or block sparse.
 
-    delassus: (3n, 3n) [1/kg], J M^-1 J^T, symmetric positive semidefinite.
+    delassus: (3n, 3n) [1/kg], J M^-1 J^T, symmetric positive semidefinite: an array, or any SciPy sparse matrix, which is kept
+        in blocks of 3 x 3.
     free_velocity: (3n,) [m/s], velocity of the contact points without contact impulses.
     friction: (n,), zero or positive; infinite and huge values count as 1e4.
 
-    Raises ValueError that names the argument and its first offending entry.
+    A problem in the plane has rows (x, z) only: see `planar`. Raises ValueError that names the argument and its first offending
+    entry.
     """
 
-    def __init__(self, delassus: ArrayLike, free_velocity: ArrayLike, friction: ArrayLike):
+    def __init__(self, delassus: ArrayLike | sparse.sparray, free_velocity: ArrayLike, friction: ArrayLike):
         mu = _numbers("friction", friction)
         if mu.ndim != 1:
             raise ValueError(f"friction has shape {mu.shape}; it must be (n,)")
         n = len(mu)
-        self._delassus = _shaped("delassus", delassus, (3 * n, 3 * n), n)
         self._free_velocity = _shaped("free_velocity", free_velocity, (3 * n,), n)
         self._friction = mu
-        for a in (self._delassus, self._free_velocity, self._friction):
+        self._dimension = 3
+        if hasattr(delassus, "tobsr"):
+            self._delassus = _blocks(delassus, n)
+            values, starts, columns = self._delassus.data, self._delassus.indptr, self._delassus.indices
+        else:
+            self._delassus = values = _shaped("delassus", delassus, (3 * n, 3 * n), n)
+            starts = columns = ()
+        for a in (values, self._free_velocity, self._friction):
             a.flags.writeable = False  # a problem that changed after its checks would not be checked
-        _core.validate_contact_problem(*self._arrays())
+        self._core = _core.CheckedProblem(
+            values.reshape(-1), self._free_velocity, mu, [int(k) for k in starts], [int(k) for k in columns]
+        )
+
+    @classmethod
+    def planar(cls, delassus: ArrayLike, free_velocity: ArrayLike, friction: ArrayLike) -> ContactProblem:
+        """A problem in the x-z plane, delassus (2n, 2n) [1/kg], free_velocity (2n,) [m/s], friction (n,); order x, z per contact.
+
+        It is kept as a problem in space whose y rows are zero: impulses and velocities are (3n,) with y = 0.
+        """
+        n = len(_numbers("friction", friction).reshape(-1))
+        G = _shaped("delassus", delassus, (2 * n, 2 * n), n)
+        c = _shaped("free_velocity", free_velocity, (2 * n,), n)
+        rows = (3 * np.arange(n)[:, None] + [0, 2]).reshape(-1)
+        spatial, velocity = np.zeros((3 * n, 3 * n)), np.zeros(3 * n)
+        spatial[np.ix_(rows, rows)] = G
+        velocity[rows] = c
+        problem = cls(spatial, velocity, friction)
+        problem._dimension = 2
+        return problem
 
     @property
-    def delassus(self) -> Array:
-        """(3n, 3n) [1/kg], read-only."""
+    def delassus(self) -> Array | sparse.bsr_array:
+        """(3n, 3n) [1/kg], read-only: an array, or a `scipy.sparse.bsr_array` with 3 x 3 blocks where it was given sparse."""
         return self._delassus
+
+    @property
+    def is_sparse(self) -> bool:
+        """`delassus` is block sparse."""
+        return not isinstance(self._delassus, np.ndarray)
+
+    def dense_delassus(self) -> Array:
+        """(3n, 3n) [1/kg] as an array, whichever form is kept."""
+        return self._delassus.toarray() if self.is_sparse else self._delassus
 
     @property
     def free_velocity(self) -> Array:
@@ -63,35 +107,89 @@ class ContactProblem:
         """n, as many as `friction` has."""
         return len(self._friction)
 
-    def _arrays(self) -> tuple[Array, Array, Array]:
-        return self._delassus.reshape(-1), self._free_velocity, self._friction
+    @property
+    def dimension(self) -> int:
+        """3, or 2 for a problem made by `planar`."""
+        return self._dimension
 
     def __repr__(self) -> str:
-        return f"ContactProblem({self.num_contacts} contacts)"
+        form = "planar, " if self.dimension == 2 else "block sparse, " if self.is_sparse else ""
+        return f"ContactProblem({form}{self.num_contacts} contacts)"
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """How good an impulse is, from the problem and the impulse alone. Velocities are v = G impulse + c."""
+
+    residuals: Array  #: (n,) residual of each contact [m/s], see `residual`
+    backward_errors: Array  #: (n,) least change of the contact's velocity that makes its impulse exact (Coulomb's law) [m/s]
+    residual: float  #: the largest [m/s]
+    backward_error: float  #: the largest [m/s]
+    penetration_speed: float  #: the largest -v_z, or 0 [m/s]
+    cone_violation: float  #: the largest |impulse_T| - mu impulse_z, or 0 [N s]
+    direction_error: float  #: largest angle between the friction of a sliding contact and the direction against its sliding [rad]
+    power: float  #: the largest |impulse . (v + mu |v_T| z)|, zero at a solution [J]
+
+
+@dataclass(frozen=True)
+class History:
+    """How a solve came about: one entry per sweep, step or iteration. Empty unless asked for."""
+
+    stage: list[Stage]  #: (k)
+    residual: Array  #: (k,) of the impulse at that point, projected on its cones [m/s]
+    time: Array  #: (k,) since the solve began [s]; recording itself takes a part of it
+
+    def __len__(self) -> int:
+        return len(self.stage)
 
 
 @dataclass(frozen=True)
 class ContactSolution:
-    """What `solve` returns: the best impulse found, and how good it is."""
+    """What `solve` returns: the best impulse found, and how good it is.
+
+    status: what ended the solve; whatever it is, the impulse is finite and inside its cones, and the certificate true.
+        "converged": the residual is within the tolerance.
+        "iteration_limit": a method chosen by name used up its sweeps or iterations. Raise the limit, or use "auto".
+        "stalled": every stage of "auto" ended above the tolerance: it lies below the rounding of the problem, or friction jams
+            and no finite impulse exists, or the problem is too hard. Compare the residual with 1e-16 |G_ii| |impulse_i|.
+        "infeasible": a contact that cannot push (G_zz near 0) is driven in; no impulse helps. Drop it, or let its body move.
+    """
 
     impulse: Array  #: (3n,) [N s]
     velocity: Array  #: (3n,) G impulse + c [m/s]
-    residual: float  #: largest contact residual [m/s]
-    contact_residuals: Array  #: (n,) [m/s]
+    certificate: Certificate
+    stage: Stage  #: what found the impulse
     sweeps: int  #: passes over all contacts
-    newton_steps: int  #: of the finish and the fallback of method "auto"
-    status: Literal["converged", "not_converged", "infeasible"]  #: infeasible: a contact that cannot push is driven in
-    history: Array  #: value of the stop test after each sweep (method "auto": residual after each stage), if asked for
+    newton_steps: int  #: of the Newton finish and of proximal Newton
+    interior_point_steps: int
+    admm_iterations: int
+    status: Literal["converged", "iteration_limit", "stalled", "infeasible"]
+    history: History
 
     @property
     def converged(self) -> bool:
-        """The residual is at most the tolerance."""
+        """The residual is within the tolerance."""
         return self.status == "converged"
+
+    @property
+    def residual(self) -> float:
+        """Largest contact residual [m/s]."""
+        return self.certificate.residual
+
+    @property
+    def contact_residuals(self) -> Array:
+        """(n,) [m/s]."""
+        return self.certificate.residuals
+
+    @property
+    def iterations(self) -> int:
+        """Sweeps, steps and iterations of all stages, added."""
+        return self.sweeps + self.newton_steps + self.interior_point_steps + self.admm_iterations
 
 
 def solve(
     problem: ContactProblem,
-    method: Literal["auto", "per_contact", "pgs"] = "auto",
+    method: SolveMethod = "auto",
     law: Law = "coulomb",
     tolerance: float = 1e-9,
     max_sweeps: int = 1000,
@@ -103,20 +201,31 @@ def solve(
     stop: Literal["residual", "violation_sum", "update_sum"] = "residual",
     single_contact_tolerance: float = 0.0,
     history: bool = False,
+    *,
+    relative_tolerance: float = 0.0,
+    max_iterations: int | None = None,
+    minimum_norm: bool = False,
+    proximal_weight: float = 1e-3,
 ) -> ContactSolution:
-    """Solves a contact problem. Never raises for a hard problem: look at `converged` and `residual`.
+    """Solves a contact problem. Never raises for a hard problem: look at `converged`, `status` and `certificate`.
 
-    method: "auto" (sweeps, Newton finish, fallback), "per_contact" ([Hwangbo 2018] Algorithm 2), "pgs" (eq. 17, 18).
-    law: "coulomb" (eq. 6: friction opposes sliding) or "max_dissipation" (eq. 8; not with "pgs").
+    method: "auto" (the chain: sweeps with a Newton finish, proximal Newton, interior point, ADMM), or one alone: "per_contact"
+        ([Hwangbo 2018] Algorithm 2), "pgs" (eq. 17, 18), "prox_newton", "interior_point", "admm".
+    law: "coulomb" (eq. 6: friction opposes sliding) or "max_dissipation" (eq. 8; "auto" and "per_contact" only).
     tolerance: on the largest contact residual [m/s], or on what `stop` names.
-    max_sweeps: passes over all contacts; "auto": of each of its stages.
-    impulse: (3n,) start [N s].
+    relative_tolerance: added to it, this much of the largest |free_velocity|.
+    max_sweeps: passes over all contacts; "auto": of each of its sweep stages.
+    max_iterations: steps of "prox_newton" (None: 500), "interior_point" (100) or "admm" (5000).
+    impulse: (3n,) start [N s]; "interior_point" starts from a point of its own.
+    minimum_norm: of the impulses with the same velocity, return the one with the least tangential part. Redundant contacts
+        leave a choice; without this it depends on the order of the contacts.
+    proximal_weight: of the first subproblem of "prox_newton", relative to G_ii.
     single_contact: method of "per_contact" for one contact; "golden_section" knows "max_dissipation" only.
     alpha, alpha_min, gamma: relaxation of "per_contact", alpha <- alpha_min + gamma (alpha - alpha_min) per sweep (the paper:
         1, 0.7, 0.99); for "pgs" alpha is the constant factor of eq. 18. Default: 1, and 0.6 for "pgs".
     stop: what ends the sweeps of "per_contact" and "pgs". The paper's are "violation_sum" and "update_sum".
     single_contact_tolerance: [N s]; 0: a tenth of what `tolerance` asks for.
-    history: record the stop test after each sweep.
+    history: record residual and time of every sweep, step and iteration.
 
     ValueError names the argument that is not usable.
     """
@@ -124,23 +233,32 @@ def solve(
     start = np.empty(0) if impulse is None else array("impulse", impulse, (3 * p.num_contacts,))
     if alpha is None:
         alpha = 0.6 if method == "pgs" else 1.0
-    core = _core.solve_contact_problem(
-        *p._arrays(),
-        start,
-        str(method),
-        str(law),
-        number("tolerance", tolerance),
-        count("max_sweeps", max_sweeps),
-        str(single_contact),
-        number("single_contact_tolerance", single_contact_tolerance),
-        number("alpha", alpha),
-        number("alpha_min", alpha_min),
-        number("gamma", gamma),
-        str(stop),
-        bool(history),
-    )
-    x, v, each, worst, sweeps, newton_steps, status, record = core
-    return ContactSolution(x, v, worst, each, sweeps, newton_steps, status, record)
+    options = {
+        "method": str(method),
+        "law": str(law),
+        "tolerance": number("tolerance", tolerance),
+        "relative_tolerance": number("relative_tolerance", relative_tolerance),
+        "max_sweeps": count("max_sweeps", max_sweeps),
+        "max_iterations": 0 if max_iterations is None else _at_least_one("max_iterations", max_iterations),
+        "minimum_norm": bool(minimum_norm),
+        "proximal_weight": number("proximal_weight", proximal_weight),
+        "single_contact": str(single_contact),
+        "single_contact_tolerance": number("single_contact_tolerance", single_contact_tolerance),
+        "alpha": number("alpha", alpha),
+        "alpha_min": number("alpha_min", alpha_min),
+        "gamma": number("gamma", gamma),
+        "stop": str(stop),
+        "history": bool(history),
+    }
+    result = p._core.solve(start, options)
+    certificate, record = Certificate(**result.pop("certificate")), History(**result.pop("history"))
+    return ContactSolution(**result, certificate=certificate, history=record)
+
+
+def certify(problem: ContactProblem, impulse: ArrayLike, law: Law = "coulomb") -> Certificate:
+    """The certificate of any impulse (3n,) [N s]: residuals, backward errors and what else may be wrong. A pure function."""
+    p = _problem(problem)
+    return Certificate(**p._core.certify(array("impulse", impulse, (3 * p.num_contacts,)), str(law)))
 
 
 def residual(problem: ContactProblem, impulse: ArrayLike, law: Law = "coulomb") -> Array:
@@ -148,8 +266,7 @@ def residual(problem: ContactProblem, impulse: ArrayLike, law: Law = "coulomb") 
 
     "coulomb": De Saxce's natural map. "max_dissipation": |G_ii (lambda_i - exact_i)| with the others held.
     """
-    p = _problem(problem)
-    return _core.contact_problem_residual(*p._arrays(), array("impulse", impulse, (3 * p.num_contacts,)), str(law))
+    return certify(problem, impulse, law).residuals
 
 
 def solve_contact(
@@ -197,6 +314,35 @@ def _time_single_contact(
     names = [methods] if isinstance(methods, str) else list(methods)
     times = _core._time_single_contact(G.reshape(-1), c.reshape(-1), mu, names, str(law), float(tolerance), int(rounds))
     return dict(zip(names, times, strict=True))
+
+
+def _at_least_one(name: str, value: int) -> int:
+    result = count(name, value)
+    if result == 0:
+        raise ValueError(f"{name} is 0; it must be at least 1, or None for the method's own limit")
+    return result
+
+
+def _blocks(matrix: sparse.sparray, n: int) -> sparse.bsr_array:
+    """The matrix in 3 x 3 blocks, sorted, without duplicates, with every diagonal block."""
+    from scipy import sparse
+
+    if matrix.shape != (3 * n, 3 * n):
+        raise ValueError(
+            f"delassus has shape {matrix.shape}; it must be {(3 * n, 3 * n)} for {n} contacts (as many as friction has)"
+        )
+    try:
+        coo = sparse.coo_array(matrix, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise type(error)(f"delassus: not a matrix of numbers ({error})") from None
+    # Zeros on the diagonal are stored, so that every contact has its own block.
+    diagonal = np.arange(3 * n)
+    rows, columns = np.concatenate([coo.row, diagonal]), np.concatenate([coo.col, diagonal])
+    values = np.concatenate([coo.data, np.zeros(3 * n)])
+    blocks = sparse.coo_array((values, (rows, columns)), shape=matrix.shape).tocsr().tobsr((3, 3))
+    blocks.sum_duplicates()
+    blocks.sort_indices()
+    return blocks
 
 
 def _problem(value: ContactProblem) -> ContactProblem:

@@ -1,5 +1,5 @@
-// A dense contact problem v = G lambda + c whose velocities are kept up to date while impulses
-// change.
+// A contact problem v = G lambda + c, G dense or block sparse, whose velocities are kept up to date
+// while impulses change.
 //
 // Owns no memory: the caller hands in the arrays and a workspace, so a step can solve without
 // allocating. The stopping tests of the sweeps are here too; all are functions of (G, c, mu,
@@ -12,42 +12,86 @@ namespace stickslip::contact {
 
 struct ExplicitProblem {
   int n = 0;                   // contacts
-  const double* G = nullptr;   // (3n, 3n) row-major, symmetric [1/kg]
+  const double* G = nullptr;   // symmetric [1/kg]: (3n, 3n) row-major, or blocks (k, 3, 3)
   const double* c = nullptr;   // (3n) [m/s]
   const double* mu = nullptr;  // (n) [1]
   double* lambda = nullptr;    // (3n) in: start, out: solution [N s]
   // Workspace.
   LocalContact<double>* local = nullptr;  // (n)
   double* v = nullptr;                    // (3n) G lambda + c [m/s]
+  double* rounding = nullptr;             // (3n) scratch of `refresh_velocity`
+  // Block sparse G, null where it is dense: row i of blocks is starts[i] .. starts[i + 1] - 1, block
+  // k belongs to column columns[k] (ascending, both triangles, every diagonal block).
+  const int* starts = nullptr;   // (n + 1)
+  const int* columns = nullptr;  // (k)
 
   /// Doubles that `attach` needs for n contacts.
   static constexpr long workspace_size(int n) {
-    return n * static_cast<long>(sizeof(LocalContact<double>) / sizeof(double)) + 3L * n;
+    return n * static_cast<long>(sizeof(LocalContact<double>) / sizeof(double)) + 6L * n;
   }
   void attach(double* workspace) {
     local = reinterpret_cast<LocalContact<double>*>(workspace);
     v = workspace + n * static_cast<long>(sizeof(LocalContact<double>) / sizeof(double));
+    rounding = v + 3L * n;
   }
   const double* row(int r) const { return G + static_cast<long>(r) * 3 * n; }
 };
 
-/// v = G lambda + c from scratch.
+/// Calls f(j, block, stride) for the blocks of row i: entry (r, s) of G_ij is block[r * stride + s].
+template <class F>
+STICKSLIP_INLINE void for_each_block(const ExplicitProblem& p, int i, F&& f) {
+  if (p.starts) {
+    for (int k = p.starts[i]; k < p.starts[i + 1]; ++k) f(p.columns[k], p.G + 9L * k, 3);
+  } else {
+    const double* g = p.row(3 * i);
+    for (int j = 0; j < p.n; ++j) f(j, g + 3 * j, 3 * p.n);
+  }
+}
+
+/// One term more of a sum in twice the precision: (sum, rest) += a b. Fused and error-free
+/// transformations, so that a velocity which is the small difference of large terms keeps its
+/// digits.
+STICKSLIP_INLINE void add_product(double a, double b, double& sum, double& rest) {
+  const double product = a * b, low = madd(a, b, -product);
+  const double next = sum + product, back = next - sum;
+  rest += ((sum - (next - back)) + (product - back)) + low;
+  sum = next;
+}
+
+/// v = G lambda + c from scratch, rounded once: with mass ratios of 1e6 a plain sum would drown
+/// 1e-8 of c in the rounding of the impulses.
 inline void refresh_velocity(ExplicitProblem& p) {
   const int m = 3 * p.n;
-  for (int r = 0; r < m; ++r) {
-    const double* g = p.row(r);
-    double sum = p.c[r];
-    for (int j = 0; j < m; ++j) sum = madd(g[j], p.lambda[j], sum);
-    p.v[r] = sum;
+  double *__restrict__ v = p.v, *__restrict__ rest = p.rounding;
+  for (int r = 0; r < m; ++r) v[r] = p.c[r], rest[r] = 0;
+  if (p.starts) {
+    for (int i = 0; i < p.n; ++i)
+      for_each_block(p, i, [&](int j, const double* g, int) {
+        const double* l = p.lambda + 3 * j;
+        for (int r = 0; r < 3; ++r)
+          for (int s = 0; s < 3; ++s)
+            add_product(g[3 * r + s], l[s], v[3 * i + r], rest[3 * i + r]);
+      });
+  } else {
+    for (int j = 0; j < m; ++j) {
+      const double* __restrict__ g = p.row(j);  // row = column: G is symmetric
+      const double l = p.lambda[j];
+      if (l == 0) continue;
+      for (int r = 0; r < m; ++r) add_product(g[r], l, v[r], rest[r]);
+    }
   }
+  for (int r = 0; r < m; ++r) v[r] += rest[r];
 }
 
 /// Local blocks and velocities; call once G, c, mu and lambda are set.
 inline void prepare(ExplicitProblem& p) {
   for (int i = 0; i < p.n; ++i) {
     LocalContact<double>& k = p.local[i];
-    const double *x = p.row(3 * i) + 3 * i, *y = p.row(3 * i + 1) + 3 * i,
-                 *z = p.row(3 * i + 2) + 3 * i;
+    const double *x = p.row(3 * i) + 3 * i, *y = x + 3 * p.n, *z = y + 3 * p.n;
+    if (p.starts)
+      for_each_block(p, i, [&](int j, const double* g, int) {
+        if (j == i) x = g, y = g + 3, z = g + 6;
+      });
     k.xx = x[0], k.xy = x[1], k.xz = x[2], k.yy = y[1], k.yz = y[2], k.zz = z[2];
     k.mu = min(p.mu[i], kMaxFriction);
     prepare(k);
@@ -65,20 +109,34 @@ STICKSLIP_INLINE void velocity_without_own(const ExplicitProblem& p, int i, doub
 
 /// Changes one impulse component and with it all velocities (row = column: G is symmetric).
 STICKSLIP_INLINE void add_component(ExplicitProblem& p, int r, double d) {
+  p.lambda[r] += d;
+  if (p.starts) {
+    for_each_block(p, r / 3, [&](int j, const double* g, int) {
+      for (int s = 0; s < 3; ++s) p.v[3 * j + s] = madd(g[3 * (r % 3) + s], d, p.v[3 * j + s]);
+    });
+    return;
+  }
   const int m = 3 * p.n;
   const double* __restrict__ g = p.row(r);
   double* __restrict__ v = p.v;
-  p.lambda[r] += d;
   for (int j = 0; j < m; ++j) v[j] = madd(g[j], d, v[j]);
 }
 
 /// Changes the impulse of contact i.
 STICKSLIP_INLINE void add_impulse(ExplicitProblem& p, int i, const double d[3]) {
+  for (int r = 0; r < 3; ++r) p.lambda[3 * i + r] += d[r];
+  const double d0 = d[0], d1 = d[1], d2 = d[2];
+  if (p.starts) {
+    for_each_block(p, i, [&](int j, const double* g, int) {
+      double* v = p.v + 3 * j;
+      for (int s = 0; s < 3; ++s)
+        v[s] = madd(g[s], d0, madd(g[3 + s], d1, madd(g[6 + s], d2, v[s])));
+    });
+    return;
+  }
   const int m = 3 * p.n;
   const double* __restrict__ x = p.row(3 * i), * __restrict__ y = x + m, * __restrict__ z = y + m;
   double* __restrict__ v = p.v;
-  for (int r = 0; r < 3; ++r) p.lambda[3 * i + r] += d[r];
-  const double d0 = d[0], d1 = d[1], d2 = d[2];
   for (int j = 0; j < m; ++j) v[j] = madd(x[j], d0, madd(y[j], d1, madd(z[j], d2, v[j])));
 }
 

@@ -5,7 +5,7 @@
 #include <map>
 #include <set>
 
-#include "contact/validate.h"
+#include "solvers/validate.h"
 #include "step/robot_impl.h"
 #include "step/snapshot.h"
 
@@ -28,10 +28,10 @@ void WorldOptions::validate() const {
   if (max_substeps < 1)
     reject("max_substeps must be at least 1, got " + std::to_string(max_substeps));
   const StepSolverOptions& s = solver;
-  contact::check_settings("WorldOptions.solver", contact::settings_of(s));
-  if (!(s.relative_tolerance >= 0) || !std::isfinite(s.relative_tolerance))
-    reject("WorldOptions.solver.relative_tolerance must be finite and >= 0, got " +
-           std::to_string(s.relative_tolerance));
+  solvers::check_settings("WorldOptions.solver", solvers::settings_of(s));
+  if (s.method != SolveMethod::kAuto && s.method != SolveMethod::kPerContact &&
+      s.method != SolveMethod::kPgs)
+    reject("WorldOptions.solver.method: a step solves by kAuto, kPerContact or kPgs; use solve() for the others");
 }
 
 struct World::Impl {

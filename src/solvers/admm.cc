@@ -1,0 +1,116 @@
+#include "solvers/admm.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace stickslip::solvers {
+namespace {
+
+constexpr double kEta = 1e-6;     // proximal weight
+constexpr double kTau = 0.5;      // share of rho that enters
+constexpr double kRatio = 10;     // primal to dual residual at which rho changes
+constexpr double kStart = 16;     // rho = 16 sqrt(L eta) at first, L the largest eigenvalue
+constexpr double kGrowth = 2;     // of rho, or shrinking, where the residuals are out of balance
+constexpr int kOfferEvery = 5;
+
+/// Euclidean projection on the cone |x_T| <= mu x_z.
+void project_on_cone(double mu, double* x) {
+  const double t = std::sqrt(x[0] * x[0] + x[1] * x[1]);
+  if (t <= mu * x[2]) return;
+  const double z = (mu * t + x[2]) / (1 + mu * mu);
+  const double f = z > 0 ? mu * z / t : 0;
+  x[0] *= f, x[1] *= f, x[2] = std::max(z, 0.0);
+}
+
+}  // namespace
+
+Admm::Admm(contact::ExplicitProblem& p)
+    : p_(p), all_(p.n), A_(9 * p.n), B_(9 * p.n), x_(3 * p.n), y_(3 * p.n), z_(3 * p.n), before_(3 * p.n) {
+  std::iota(all_.begin(), all_.end(), 0);
+  double trace = 0;
+  for (int i = 0; i < p.n; ++i) trace += 3 * p.local[i].scale;
+  if (trace > 0) unit_ = trace / (3 * p.n);
+}
+
+bool Admm::factor(double rho) {
+  for (int i = 0; i < p_.n; ++i)
+    for (int r = 0; r < 3; ++r) {
+      A_[9 * i + 4 * r] = kEta + kTau * rho;
+      B_[9 * i + 4 * r] = 1 / unit_;
+    }
+  return system_.factor(p_, all_, A_.data(), B_.data());
+}
+
+/// Of G / unit, by a few power steps from a fixed start: a tenth is precise enough for rho.
+double Admm::largest_eigenvalue() {
+  const std::vector<double> kept(p_.lambda, p_.lambda + 3 * p_.n);
+  double length = 0;
+  for (int r = 0; r < 3 * p_.n; ++r) p_.lambda[r] = 1 + 0.1 * (r % 7);
+  for (int k = 0; k < 12; ++k) {
+    double before = 0;
+    for (int r = 0; r < 3 * p_.n; ++r) before += p_.lambda[r] * p_.lambda[r];
+    contact::refresh_velocity(p_);
+    length = 0;
+    for (int r = 0; r < 3 * p_.n; ++r) {
+      const double g = (p_.v[r] - p_.c[r]) / unit_;
+      length += g * g;
+      p_.lambda[r] = g;
+    }
+    if (!(length > 0)) break;
+    const double f = 1 / std::sqrt(length);
+    length = std::sqrt(length / before);
+    for (int r = 0; r < 3 * p_.n; ++r) p_.lambda[r] *= f;
+  }
+  std::copy(kept.begin(), kept.end(), p_.lambda);
+  return std::max(length, 1e-3);
+}
+
+bool Admm::run(BestImpulse& best, int max_iterations) {
+  const int m = 3 * p_.n;
+  if (m == 0) return best.solved();
+  double rho = kStart * std::sqrt(largest_eigenvalue() * kEta);
+  if (!factor(rho)) return false;
+  contact::refresh_velocity(p_);
+  std::copy(p_.lambda, p_.lambda + m, y_.begin());
+  x_ = y_;
+  for (int r = 0; r < m; ++r) z_[r] = p_.v[r] / unit_;
+  for (int k = 0; k < max_iterations; ++k) {
+    ++iterations_;
+    const double weight = kTau * rho;
+    std::vector<double>& right = before_;
+    for (int i = 0; i < p_.n; ++i) {
+      const double shift = p_.local[i].mu * std::sqrt(z_[3 * i] * z_[3 * i] + z_[3 * i + 1] * z_[3 * i + 1]);
+      for (int r = 3 * i; r < 3 * i + 3; ++r)
+        right[r] = kEta * x_[r] + weight * y_[r] + z_[r] - p_.c[r] / unit_ - (r % 3 == 2 ? shift : 0);
+    }
+    system_.solve(right.data());
+    double primal = 0, dual = 0;
+    for (int i = 0; i < p_.n; ++i) {
+      double y[3];
+      for (int r = 0; r < 3; ++r) y[r] = right[3 * i + r] - z_[3 * i + r] / weight;
+      project_on_cone(p_.local[i].mu, y);
+      for (int r = 0; r < 3; ++r) {
+        const int at = 3 * i + r;
+        const double x = right[at];
+        primal = std::max(primal, std::fabs(x - y[r]));
+        dual = std::max(dual, std::fabs(weight * (y[r] - y_[at]) + kEta * (x - x_[at])));
+        z_[at] -= weight * (x - y[r]);
+        x_[at] = x;
+        y_[at] = y[r];
+      }
+    }
+    if (k < kOfferEvery || k % kOfferEvery == 0 || k + 1 == max_iterations) {
+      std::copy(y_.begin(), y_.end(), p_.lambda);
+      if (best.offer(p_, SolveStage::kAdmm)) return true;
+      if (!std::isfinite(primal + dual)) return false;
+    }
+    const bool grow = primal > kRatio * dual, shrink = dual > kRatio * primal;
+    if (!grow && !shrink) continue;
+    rho *= grow ? kGrowth : 1 / kGrowth;
+    if (!factor(rho)) return false;
+  }
+  return best.solved();
+}
+
+}  // namespace stickslip::solvers

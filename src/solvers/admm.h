@@ -1,0 +1,36 @@
+// Alternating direction method of multipliers with De Saxce's shift (docs/theory/contact.md (C50)-(C52)),
+// [Carpentier 2024]:
+//
+//   x <- argmin 1/2 x^T G x + (c + shift) x + eta/2 |x - x_old|^2 + rho/2 |x - y - z/rho|^2,
+//   y <- P_K(x - z / rho),   z <- z - rho (x - y),   shift_i = mu |z_T|;   z tends to v + shift
+// with a spectral rule for rho. Coulomb's law. A method of the field to compare with, and a start for
+// Newton steps where nothing else has helped.
+#pragma once
+#include <vector>
+
+#include "solvers/best_impulse.h"
+#include "solvers/block_system.h"
+
+namespace stickslip::solvers {
+
+class Admm {
+ public:
+  explicit Admm(contact::ExplicitProblem& p);
+
+  /// Starts at p.lambda, offers iterates. True once solved. Leaves p.lambda at the last iterate.
+  bool run(BestImpulse& best, int max_iterations);
+  int iterations() const { return iterations_; }
+
+ private:
+  bool factor(double rho);
+  double largest_eigenvalue();
+
+  contact::ExplicitProblem& p_;
+  BlockSystem system_;
+  std::vector<int> all_;
+  std::vector<double> A_, B_, x_, y_, z_, before_;
+  double unit_ = 1;  // mean of the diagonal of G [1/kg]: the method runs on G / unit
+  int iterations_ = 0;
+};
+
+}  // namespace stickslip::solvers

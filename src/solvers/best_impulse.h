@@ -1,0 +1,82 @@
+// The best impulse of a solve so far, and the record of how it came about. Methods may end on a worse
+// point than they have seen; the caller never gets that.
+#pragma once
+#include <stickslip/contact.h>
+
+#include <chrono>
+#include <vector>
+
+#include "contact/explicit_problem.h"
+
+namespace stickslip::solvers {
+
+/// Brings every impulse into its cone: normal part kept if not negative, tangential part shortened.
+inline void project_on_cones(contact::ExplicitProblem& p) {
+  for (int i = 0; i < p.n; ++i) {
+    double* l = p.lambda + 3 * i;
+    l[2] = max(l[2], 0.0);
+    const double square = l[0] * l[0] + l[1] * l[1], limit = p.local[i].mu * l[2];
+    if (square > limit * limit) {
+      const double f = limit / sqrt(square);
+      l[0] *= f, l[1] *= f;
+    }
+  }
+}
+
+class BestImpulse {
+ public:
+  /// `history`: where each offer is recorded, or null.
+  BestImpulse(double tolerance, bool max_dissipation, std::vector<HistoryEntry>* history)
+      : tolerance_(tolerance), max_dissipation_(max_dissipation), history_(history) {
+    if (history_) start_ = Clock::now();
+  }
+
+  /// Takes p.lambda, projected on its cones, if its residual is the least so far; p.v is up to date
+  /// afterwards. True once an impulse within the tolerance has been seen.
+  bool offer(contact::ExplicitProblem& p, SolveStage stage) {
+    project_on_cones(p);
+    contact::refresh_velocity(p);
+    last_ = largest_residual(p, max_dissipation_);
+    if (!(last_ < __builtin_inf())) last_ = __builtin_inf();
+    record(stage, last_);
+    if (last_ < residual_ || impulse_.empty()) {
+      residual_ = last_;
+      stage_ = stage;
+      if (last_ < __builtin_inf())
+        impulse_.assign(p.lambda, p.lambda + 3 * p.n);
+      else
+        impulse_.assign(3 * p.n, 0.0);
+    }
+    return solved();
+  }
+  /// Puts the best impulse back into the problem; p.v is up to date afterwards.
+  void restore(contact::ExplicitProblem& p) const {
+    for (int i = 0; i < 3 * p.n; ++i) p.lambda[i] = impulse_[i];
+    contact::refresh_velocity(p);
+  }
+  void record(SolveStage stage, double residual) {
+    if (!history_) return;
+    const std::chrono::duration<double> time = Clock::now() - start_;
+    history_->push_back({stage, time.count(), residual});
+  }
+
+  bool solved() const { return residual_ <= tolerance_; }
+  double tolerance() const { return tolerance_; }
+  double residual() const { return residual_; }
+  double last_residual() const { return last_; }
+  bool max_dissipation() const { return max_dissipation_; }
+  bool records() const { return history_ != nullptr; }
+  SolveStage stage() const { return stage_; }
+  const std::vector<double>& impulse() const { return impulse_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  double tolerance_, residual_ = __builtin_inf(), last_ = __builtin_inf();
+  bool max_dissipation_;
+  SolveStage stage_ = SolveStage::kStart;
+  std::vector<double> impulse_;
+  std::vector<HistoryEntry>* history_;
+  Clock::time_point start_;
+};
+
+}  // namespace stickslip::solvers

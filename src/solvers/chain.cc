@@ -1,0 +1,194 @@
+#include "solvers/chain.h"
+
+#include <cmath>
+
+#include "contact/per_contact.h"
+#include "solvers/interior_point.h"
+#include "solvers/prox_newton.h"
+#include "solvers/admm.h"
+
+namespace stickslip::solvers {
+namespace {
+
+using contact::ExplicitProblem;
+
+/// Contacts up to which a Newton step costs about as much as a few sweeps.
+constexpr int kRobotSized = BlockSystem::kDenseRows / 3;
+
+/// One visit of contact i: its exact impulse with the others held, a sliding one by a single Halley step
+/// from its last direction, since the sweep will come back. Returns the squared velocity change.
+double visit(ExplicitProblem& p, int i, double speed, double direction[2]) {
+  const contact::LocalContact<double>& k = p.local[i];
+  double c[3], next[3];
+  contact::velocity_without_own(p, i, c);
+  if (contact::is_singular(k)) [[unlikely]] {
+    const contact::SlipSolution s = contact::solve_single<contact::Method::kHalley, false>(k, c, speed);
+    next[0] = s.x, next[1] = s.y, next[2] = s.z;
+  } else {
+    const contact::Reduced<double> r = contact::reduce(k, c[0], c[1], c[2]);
+    if (r.slip) {
+      next[0] = next[1] = 0, next[2] = r.a;
+      if (k.mu > 0) contact::visit_slip<false>(k, r, speed, direction, next);
+    } else {
+      next[0] = r.stick ? r.x : 0, next[1] = r.stick ? r.y : 0, next[2] = r.stick ? r.z : 0;
+    }
+  }
+  const double* l = p.lambda + 3 * i;
+  const double d[3] = {next[0] - l[0], next[1] - l[1], next[2] - l[2]};
+  const double size = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+  if (size > 0) contact::add_impulse(p, i, d);
+  return size * k.scale * k.scale;
+}
+
+class Chain {
+ public:
+  Chain(ExplicitProblem& p, BestImpulse& best, int max_sweeps, Effort& effort)
+      : p_(p), best_(best), max_sweeps_(max_sweeps), effort_(effort), directions_(2 * p.n) {}
+
+  void run() {
+    if (sweeps_with_newton() || patient_sweeps()) return;
+    // What is left is hyperstatic, ill-conditioned or large.
+    ProxNewton newton(p_);
+    Counted counted(newton, effort_);
+    const auto from_best = [&](double alpha, int steps) {
+      best_.restore(p_);
+      return newton.run(best_, alpha, steps);
+    };
+    if (from_best(1e-3, 60)) return;
+    for (const Shift shift : {Shift::kLagged, Shift::kExact, Shift::kDamped}) {
+      if (interior_point(shift)) return;
+      // Its last impulse knows the active set; small weights keep it.
+      const std::vector<double> end(p_.lambda, p_.lambda + 3 * p_.n);
+      for (const double alpha : {1e-8, 1e-5}) {
+        put(end);
+        if (newton.run(best_, alpha, 40)) return;
+      }
+    }
+    for (const double alpha : {1e-1, 1e-5}) {
+      if (from_best(alpha, 150)) return;
+      if (relaxed_sweeps()) return;
+    }
+    put(std::vector<double>(3 * p_.n));
+    if (newton.run(best_, 1.0, 150)) return;
+    if (admm(3000)) return;
+    newton.run(best_, 1e-2, 300);
+  }
+
+ private:
+  /// Adds the steps of a ProxNewton to the effort when it goes out of scope.
+  struct Counted {
+    Counted(const ProxNewton& newton, Effort& effort) : newton(newton), effort(effort) {}
+    ~Counted() { effort.newton_steps += newton.steps(); }
+    const ProxNewton& newton;
+    Effort& effort;
+  };
+
+  void put(const std::vector<double>& impulse) {
+    for (int r = 0; r < 3 * p_.n; ++r) p_.lambda[r] = impulse[r];
+    contact::refresh_velocity(p_);
+  }
+
+  /// The largest velocity change of a sweep [m/s].
+  double sweep() {
+    const double speed = 0.01 * best_.tolerance();
+    double change = 0;
+    for (int i = 0; i < p_.n; ++i)
+      change = std::fmax(change, visit(p_, i, speed, directions_.data() + 2 * i));
+    ++effort_.sweeps;
+    change = std::sqrt(change);
+    if (best_.records()) best_.record(SolveStage::kSweeps, largest_residual(p_, false));
+    return change;
+  }
+
+  /// Sweeps, and Newton steps where the next sweep is not expected to converge.
+  bool sweeps_with_newton() {
+    if (p_.n > kRobotSized) return false;
+    constexpr int kMost = 16;
+    ProxNewton newton(p_);
+    Counted counted(newton, effort_);
+    const double tolerance = best_.tolerance();
+    double before = INFINITY;
+    for (int k = 1; k <= kMost && k <= max_sweeps_; ++k) {
+      const double change = sweep();
+      if (change <= tolerance && best_.offer(p_, SolveStage::kSweeps)) return true;
+      if (k >= 2 && (k >= 5 || change * change > tolerance * before)) {
+        // Late steps are more cautious.
+        if (newton.step(k < 8 ? 1e-6 : 1e-5) && best_.offer(p_, SolveStage::kNewton)) return true;
+      }
+      before = change;
+    }
+    return best_.offer(p_, SolveStage::kSweeps);
+  }
+
+  /// Sweeps for as long as a block of them halves their change.
+  bool patient_sweeps() {
+    const int block = 8;
+    if (!best_.impulse().empty()) best_.restore(p_);
+    double last = INFINITY;
+    for (int k = 1; k <= max_sweeps_; ++k) {
+      const double change = sweep();
+      if (change <= best_.tolerance() && best_.offer(p_, SolveStage::kSweeps)) return true;
+      if (k % block != 0) continue;
+      if (best_.offer(p_, SolveStage::kSweeps)) return true;
+      if (!(best_.last_residual() < 0.5 * last)) break;
+      last = best_.last_residual();
+    }
+    return best_.offer(p_, SolveStage::kSweeps);
+  }
+
+  bool relaxed_sweeps() {
+    best_.restore(p_);
+    contact::SweepOptions o;
+    o.tolerance = best_.tolerance();
+    o.max_sweeps = max_sweeps_ < 100 ? max_sweeps_ : 100;
+    o.alpha = 0.7;
+    effort_.sweeps += contact::per_contact(p_, o).sweeps;
+    return best_.offer(p_, SolveStage::kSweeps);
+  }
+
+  bool interior_point(Shift shift) {
+    InteriorPoint method(p_);
+    const bool solved = method.run(best_, shift, 80);
+    effort_.interior_point_steps += method.iterations();
+    return solved;
+  }
+
+  bool admm(int iterations) {
+    best_.restore(p_);
+    Admm method(p_);
+    const bool solved = method.run(best_, iterations);
+    effort_.admm_iterations += method.iterations();
+    return solved;
+  }
+
+  ExplicitProblem& p_;
+  BestImpulse& best_;
+  int max_sweeps_;
+  Effort& effort_;
+  std::vector<double> directions_;
+};
+
+void run_max_dissipation(ExplicitProblem& p, BestImpulse& best, int max_sweeps, Effort& effort) {
+  contact::SweepOptions o;
+  o.max_dissipation = true;
+  o.tolerance = best.tolerance();
+  o.max_sweeps = max_sweeps;
+  for (const double alpha : {1.0, 0.7}) {
+    if (!best.impulse().empty()) best.restore(p);
+    o.alpha = alpha;
+    effort.sweeps += contact::per_contact(p, o).sweeps;
+    if (best.offer(p, SolveStage::kSweeps)) return;
+  }
+}
+
+}  // namespace
+
+void run_chain(ExplicitProblem& p, BestImpulse& best, int max_sweeps, Effort& effort) {
+  if (p.n == 0) return;
+  if (best.max_dissipation())
+    run_max_dissipation(p, best, max_sweeps, effort);
+  else
+    Chain(p, best, max_sweeps, effort).run();
+}
+
+}  // namespace stickslip::solvers

@@ -1,0 +1,18 @@
+// The chain behind method "auto" (docs/theory/contact.md, section 7): cheap methods first, each stage starting
+// where the best impulse so far lies, until one meets the tolerance.
+#pragma once
+#include "solvers/best_impulse.h"
+
+namespace stickslip::solvers {
+
+/// What a solve took.
+struct Effort {
+  int sweeps = 0, newton_steps = 0, interior_point_steps = 0, admm_iterations = 0;
+};
+
+/// Improves `best` on a prepared problem, starting at p.lambda, until it is solved or every stage has had its
+/// turn. Coulomb's law: sweeps with a Newton finish, proximal Newton, interior point, ADMM. Maximum dissipation
+/// is no complementarity problem in the velocity: sweeps, plain and relaxed, at most `max_sweeps` each.
+void run_chain(contact::ExplicitProblem& p, BestImpulse& best, int max_sweeps, Effort& effort);
+
+}  // namespace stickslip::solvers

@@ -1,0 +1,28 @@
+// Block systems beyond robot size, by Eigen: sparse LU where G is block sparse, blocked dense LU where it
+// is full. Apart, because only this and the check for definiteness see Eigen.
+#pragma once
+#include <memory>
+#include <vector>
+
+#include "contact/explicit_problem.h"
+
+namespace stickslip::solvers {
+
+class LargeSystem {
+ public:
+  LargeSystem();
+  ~LargeSystem();
+
+  bool factor(const contact::ExplicitProblem& p, const std::vector<int>& active, const double* A,
+              const double* B);
+  void solve(double* x);
+
+ private:
+  struct Factors;
+  std::unique_ptr<Factors> factors_;
+};
+
+/// The largest eigenvalue of G below zero is at least -shift: G + shift is positive definite.
+bool is_definite(const contact::ExplicitProblem& p, double shift);
+
+}  // namespace stickslip::solvers

@@ -1,0 +1,41 @@
+// Proximal point method with damped semismooth Newton steps on the map of Alart and Curnier, on an
+// explicit problem (docs/theory/contact.md (C35)-(C38)). Coulomb's law.
+//
+// lambda^(k+1) solves the problem with v + alpha scale (lambda - lambda^k) in place of v: regular
+// however redundant the contacts are. alpha shrinks after each solved subproblem, also where the
+// residual has not halved (a rule driven by the residual loses stacks), and grows after a failure.
+#pragma once
+#include <vector>
+
+#include "solvers/alart_curnier.h"
+#include "solvers/best_impulse.h"
+#include "solvers/block_system.h"
+
+namespace stickslip::solvers {
+
+class ProxNewton {
+ public:
+  explicit ProxNewton(contact::ExplicitProblem& p);
+
+  /// Starts at p.lambda with proximal weight alpha; offers what it finds. True once solved; at most
+  /// `max_steps` Newton steps. Leaves p.lambda anywhere.
+  bool run(BestImpulse& best, double alpha, int max_steps);
+  /// One undamped step from p.lambda with weight alpha, onto the cones; p.v must be up to date, and
+  /// is afterwards. False, and nothing changed, where it is not finite.
+  bool step(double alpha);
+  int steps() const { return steps_; }
+
+ private:
+  bool subproblem(double alpha, double start_residual, double tolerance, int max_steps);
+  void shift_velocity(double alpha);
+  double merit();
+  bool direction(double alpha);
+
+  contact::ExplicitProblem& p_;
+  BlockSystem system_;
+  std::vector<double> center_, origin_, direction_, u_, A_, B_, F_;
+  std::vector<int> active_;
+  int steps_ = 0;
+};
+
+}  // namespace stickslip::solvers
