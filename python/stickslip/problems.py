@@ -287,9 +287,7 @@ _count = count  # `generate` has an argument of this name
 
 
 def _quadruped(family: str, seed: int, friction: float | None) -> ContactProblem:
-    return _problem(
-        _core.problems.quadruped(family, count("seed", seed), _optional(_friction, "friction", friction))
-    )
+    return _problem(_core.problems.quadruped(family, count("seed", seed), _optional(_friction, "friction", friction)))
 
 
 def _problem(arrays: tuple[Any, ...]) -> ContactProblem:
