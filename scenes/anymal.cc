@@ -6,7 +6,6 @@
 
 #include <set>
 
-#include "lane/math.h"
 #include "scenes/vector.h"
 
 namespace stickslip::scenes {
@@ -26,26 +25,6 @@ constexpr Link kLinks[3] = {
 };
 constexpr Vector3 kHip{0.277, 0.116, 0}, kThigh{0.0635, 0.041, 0}, kShank{0, 0.109, -0.25};
 constexpr Vector3 kFoot{0.1, -0.02, -0.298};
-
-Matrix3 product(const Matrix3& a, const Matrix3& b) {
-  Matrix3 c{};
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      c[3 * i + j] = a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j];
-  return c;
-}
-
-Matrix3 rotation_x(double angle) {
-  double s, c;
-  sincos(angle, s, c);
-  return {1, 0, 0, 0, c, -s, 0, s, c};
-}
-
-Matrix3 rotation_y(double angle) {
-  double s, c;
-  sincos(angle, s, c);
-  return {c, 0, s, 0, 1, 0, -s, 0, c};
-}
 
 // Columns axis_j x (point - origin_j) of the joints 0..last that move the point.
 Matrix3 point_jacobian(const Vector3* axes, const Vector3* origins, const Vector3& point,
@@ -78,11 +57,11 @@ LegState leg_state(int leg, std::span<const double> q, std::span<const double> u
   Matrix3 frames[3];
   Vector3 origins[3], axes[3];
   origins[0] = base * mirror(kHip);
-  frames[0] = product(base, rotation_x(angle[0]));
+  frames[0] = base * rotation(0, angle[0]);
   origins[1] = origins[0] + frames[0] * mirror(kThigh);
-  frames[1] = product(frames[0], rotation_y(angle[1]));
+  frames[1] = frames[0] * rotation(1, angle[1]);
   origins[2] = origins[1] + frames[1] * mirror(kShank);
-  frames[2] = product(frames[0], rotation_y(angle[1] + angle[2]));
+  frames[2] = frames[0] * rotation(1, angle[1] + angle[2]);
   axes[0] = {base[0], base[3], base[6]};
   axes[1] = axes[2] = {frames[0][1], frames[0][4], frames[0][7]};
 

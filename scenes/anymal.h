@@ -7,13 +7,14 @@
 #include <array>
 #include <span>
 
+#include "scenes/constants.h"
+
 namespace stickslip::scenes {
 
 inline constexpr int kNumLegs = 4;
 inline constexpr int kNumJoints = 12;
 inline constexpr double kFootRadius = 0.031;   ///< [m]
 inline constexpr double kTotalMass = 30.4754;  ///< [kg]
-inline constexpr double kGravity = 9.81;       ///< [m/s^2]
 
 /// Position of our leg (LF LH RF RH) in the order LF RF LH RH, which the generated MuJoCo model
 /// uses; its own inverse.

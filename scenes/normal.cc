@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "lane/math.h"
+#include "scenes/portable_math.h"
 
 namespace stickslip::scenes {
 namespace {
@@ -17,21 +17,6 @@ std::uint64_t hash(std::uint64_t k) {
 
 // Uniform in (0, 1): 53 random bits, centered so that 0 cannot occur.
 double uniform(std::uint64_t k) { return (static_cast<double>(hash(k) >> 11) + 0.5) * 0x1p-53; }
-
-// ln(x), x > 0: x = m 2^e with m in [sqrt(1/2), sqrt(2)), ln m = 2 atanh((m - 1) / (m + 1)). About
-// 1e-16 of error; libm's last bit differs from machine to machine.
-double logarithm(double x) {
-  int exponent;
-  double m = std::frexp(x, &exponent);
-  if (m < 0.70710678118654752) {
-    m *= 2;
-    --exponent;
-  }
-  const double s = (m - 1) / (m + 1), s2 = s * s;
-  double series = 0;
-  for (int n = 21; n >= 1; n -= 2) series = series * s2 + 1.0 / n;
-  return 2 * s * series + 0.69314718055994531 * exponent;
-}
 
 }  // namespace
 

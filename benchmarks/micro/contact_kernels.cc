@@ -8,6 +8,7 @@
 #include <memory>
 #include <vector>
 
+#include "scenes/contact_families.h"
 #include "tests/cpp/contact/robot_problems.h"
 
 using namespace stickslip;
@@ -39,25 +40,22 @@ double median_ns(int n, F body) {
 bool good = true;
 
 template <bool kMaxDissipation>
-void time_slip(int family, double tolerance) {
-  Random rng(7 + family);
-  std::vector<Single> problems;
+void time_slip(ContactFamily family, double tolerance) {
+  const std::vector<SingleContact> problems =
+      random_contacts(family, 20000, 7, ContactMix::kSlipOnly);
   std::vector<LocalContact<double>> local;
-  while (local.size() < 20000) {
-    const Single p = random_single(family, rng);
+  for (const SingleContact& p : problems) {
     LocalContact<double> k = {};
-    k.xx = p.g[0], k.xy = p.g[1], k.xz = p.g[2], k.yy = p.g[4], k.yz = p.g[5], k.zz = p.g[8],
+    k.xx = p.G[0], k.xy = p.G[1], k.xz = p.G[2], k.yy = p.G[4], k.yz = p.G[5], k.zz = p.G[8],
     k.mu = p.mu;
     prepare(k);
-    if (!reduce(k, p.c[0], p.c[1], p.c[2]).slip) continue;
-    problems.push_back(p);
     local.push_back(k);
   }
   long evaluations = 0;
   std::vector<double> impulse(3 * local.size());
   const double ns = median_ns(int(local.size()), [&](int i) {
     int n;
-    solve_halley<kMaxDissipation>(local[i], problems[i].c, tolerance, &impulse[3 * i], n);
+    solve_halley<kMaxDissipation>(local[i], problems[i].c.data(), tolerance, &impulse[3 * i], n);
     evaluations += n;
   });
   if (!kMaxDissipation)
@@ -69,7 +67,7 @@ void time_slip(int family, double tolerance) {
       good = good && natural_map_residual(local[i], v, &impulse[3 * i]) <=
                          10 * tolerance * std::sqrt(speed);
     }
-  std::printf("  %-16s %-16s tolerance %g: %6.1f ns, %.2f evaluations\n", name(family),
+  std::printf("  %-16s %-16s tolerance %g: %6.1f ns, %.2f evaluations\n", family_name(family),
               kMaxDissipation ? "max_dissipation" : "coulomb", tolerance, ns,
               double(evaluations) / (11.0 * local.size()));
 }
@@ -141,7 +139,7 @@ void time_factored(int scene, bool warm, double mu) {
 int main() {
   std::puts("slip impulse of one contact, opening and sticking tests included");
   for (double tolerance : {1e-6, 1e-10})
-    for (int family = 0; family < kNumFamilies; ++family) {
+    for (const ContactFamily family : kContactFamilies) {
       time_slip<false>(family, tolerance);
       time_slip<true>(family, tolerance);
     }

@@ -14,6 +14,7 @@ void bind_model(nanobind::module_& m);
 void bind_contact(nanobind::module_& m);
 void bind_world(nanobind::module_& m);
 void bind_scenes(nanobind::module_& m);
+void bind_problems(nanobind::module_& m);
 
 /// Arrays that come in: contiguous float64. The Python front makes them so; shapes are checked by
 /// name there.

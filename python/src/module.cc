@@ -27,4 +27,5 @@ NB_MODULE(_core, m) {
   stickslip::python::bind_contact(m);
   stickslip::python::bind_world(m);
   stickslip::python::bind_scenes(m);
+  stickslip::python::bind_problems(m);
 }

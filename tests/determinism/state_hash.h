@@ -1,5 +1,5 @@
-// Hashes of states after many steps of known scenes: when a bit changes anywhere, one of these
-// does.
+// Hashes of states after many steps of known scenes, and of generated contact problems: when a bit
+// changes anywhere, one of these does.
 #pragma once
 #include <cstdint>
 #include <cstdio>
@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "check.h"
+#include "scenes/problem_families.h"
 #include "scenes/tasks.h"
 #include "step/bodies.h"
 
@@ -70,6 +71,16 @@ inline Entry trees(const WorldOptions& o, int steps) {
   return {name("trees", o, steps), of(world)};
 }
 
+/// The first twenty problems of a family.
+inline Entry problems(const scenes::ProblemFamily& family) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    const ContactProblem p = family.make(seed);
+    hash = add(add(add(hash, p.delassus), p.free_velocity), p.friction);
+  }
+  return {std::string("problems ") + family.name, hash};
+}
+
 inline std::vector<Entry> all(const ModelPtr& anymal) {
   using scenes::TaskKind;
   std::vector<Entry> out;
@@ -90,6 +101,7 @@ inline std::vector<Entry> all(const ModelPtr& anymal) {
     e.name += method == SolveMethod::kPgs ? " pgs" : " per_contact";
     out.push_back(e);
   }
+  for (const auto& family : scenes::problem_families()) out.push_back(problems(family));
   return out;
 }
 

@@ -33,6 +33,7 @@ bool write_golden(const std::vector<state_hash::Entry>& entries) {
       file,
       "# hash of q, u and impulses at the end | scene, integrator, time step, steps "
       "(tests/determinism)\n"
+      "# hash of the first twenty problems | problems, family\n"
       "# renewed with: STICKSLIP_WRITE_GOLDEN=1 <build>/tests/determinism/determinism_golden\n");
   for (const state_hash::Entry& e : entries)
     std::fprintf(file, "%016" PRIx64 " %s\n", e.hash, e.name.c_str());

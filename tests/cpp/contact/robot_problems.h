@@ -1,54 +1,15 @@
-// Random problems of several contacts on a quadruped, factored and dense. Plain double code for
-// tests and benchmarks.
+// The quadruped's problems (scenes/quadruped.h) in the factored form of a step, for tests and
+// benchmarks of its solver.
 #pragma once
+#include <cmath>
+#include <cstring>
+
 #include "contact/factored.h"
-#include "contact/random_problems.h"
+#include "scenes/quadruped.h"
 
 namespace problems {
 
-enum Scene { kStand, kImpact, kRestEight, kDropEight, kDropTwelve, kSoles, kNumScenes };
-inline const char* scene_name(int s) {
-  static const char* const names[] = {
-      "stand, 4 feet", "impact, 4 feet",      "rest, 4 feet + 4 corners",
-      "drop, 4 + 4",   "drop, 4 + 8 corners", "two soles of 4 contacts"};
-  return names[s];
-}
-
-/// Contact rows in the coordinates of the factor, v = c0 + Y x with M^-1 = L^-1 L^-T and Y = J
-/// L^-1.
-struct RobotProblem {
-  int n = 0, m = 6;
-  double y[12][3][18], c0[12][3], mu = 0.8;
-  int leg[12];  // -1: torso
-  bool soles = false;
-};
-
-inline RobotProblem random_robot_problem(int scene, Random& rng) {
-  const Quadruped robot(rng);
-  RobotProblem p;
-  double u[18];
-  const double size = scene == kStand ? 1e-3 : scene == kRestEight ? 1e-2 : 2.0;
-  for (double& x : u) x = size * rng.normal();
-  if (scene == kImpact || scene >= kDropEight) u[2] -= 3;
-  u[2] -= 9.81e-3;
-  if (scene == kStand || scene == kRestEight)
-    for (int j = 6; j < 18; ++j) u[j] += 0.3 * rng.normal();
-  p.mu = rng.uniform(0.3, 1.0);
-  p.soles = scene == kSoles;
-  const int corners = scene == kDropTwelve ? 8 : scene >= kRestEight && scene <= kDropEight ? 4 : 0;
-  p.n = p.soles ? 8 : 4 + corners;
-  p.m = p.soles ? 12 : 6;
-  for (int i = 0; i < p.n; ++i) {
-    p.leg[i] = p.soles ? i / 4 : i < 4 ? i : -1;
-    const auto& rows = p.soles ? robot.sole_rows[i / 4][i % 4] : robot.rows[i];
-    project_rows(robot, rows, p.y[i]);
-    for (int r = 0; r < 3; ++r) {
-      p.c0[i][r] = 0;
-      for (int k = 0; k < 18; ++k) p.c0[i][r] += rows[r][k] * u[k];
-    }
-  }
-  return p;
-}
+using namespace stickslip::scenes;
 
 /// Writes the problem into one lane.
 template <class S>

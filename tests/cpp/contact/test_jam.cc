@@ -6,11 +6,11 @@
 #include "check.h"
 #include "contact/factored.h"
 #include "contact/owned_problem.h"
-#include "contact/random_problems.h"
+#include "scenes/random.h"
 
 using namespace stickslip;
 using namespace stickslip::contact;
-using problems::Random;
+using scenes::Random;
 
 namespace {
 

@@ -22,20 +22,6 @@ bool finite(const SolveResult& r) {
   return all(r.impulse) && all(r.velocity) && all(r.contact_residuals) && std::isfinite(r.residual);
 }
 
-/// Two rigid copies of each contact of a problem: G is singular.
-ContactProblem duplicated(const ContactProblem& p) {
-  const int n = p.num_contacts();
-  ContactProblem d;
-  for (int i = 0; i < 2 * n; ++i) {
-    d.friction.push_back(p.friction[i / 2]);
-    for (int r = 0; r < 3; ++r) d.free_velocity.push_back(p.free_velocity[3 * (i / 2) + r]);
-  }
-  for (int i = 0; i < 6 * n; ++i)
-    for (int j = 0; j < 6 * n; ++j)
-      d.delassus.push_back(p.delassus[(3 * (i / 6) + i % 3) * 3 * n + 3 * (j / 6) + j % 3]);
-  return d;
-}
-
 }  // namespace
 
 TEST(BadProblemsAreNamedWithTheirFirstOffendingEntry) {
@@ -123,7 +109,8 @@ TEST(AutoSolvesMaximumDissipationOnFourFeet) {
 TEST(TowersAndTheirMassRatiosAreSolved) {
   for (const double ratio : {1.0, 100.0, 1000.0})
     for (const int copies : {1, 2}) {
-      const ContactProblem p = problems::tower({1, ratio, 1}, 0.5, 2, copies);
+      const ContactProblem p =
+          problems::duplicate(problems::box_stack({1, ratio, 1}, 0.5, 2), copies);
       const SolveResult r = solve(p);
       std::printf("  1 : %g : 1, %d copies: residual %.1e, sweeps %d, Newton steps %d\n", ratio,
                   copies, r.residual, r.sweeps, r.newton_steps);
@@ -140,7 +127,7 @@ TEST(DuplicatedContactsGiveTheSameVelocities) {
   for (int i = 0; i < 50; ++i) {
     const ContactProblem p =
         problems::dense(problems::random_robot_problem(problems::kImpact, rng));
-    const SolveResult a = solve(p), b = solve(duplicated(p));
+    const SolveResult a = solve(p), b = solve(problems::duplicate(p, 2));
     CHECK(a.status == SolveStatus::kConverged && b.status == SolveStatus::kConverged);
     for (int k = 0; k < p.num_contacts(); ++k)
       for (int r = 0; r < 3; ++r) CHECK_NEAR(a.velocity[3 * k + r], b.velocity[6 * k + r], 1e-6);
@@ -306,7 +293,7 @@ TEST(AJammedContactIsFiniteAndNotCalledSolved) {
 TEST(MatricesRoundedToFewDigitsAreSolvedAsTheyAre) {
   // A tower's singular G with entries rounded to 7 digits, as text files have them: slightly
   // indefinite.
-  ContactProblem p = problems::tower({1, 2, 1}, 0.5, 1);
+  ContactProblem p = problems::box_stack({1, 2, 1}, 0.5, 1);
   const double unit = 1e-7 * problems::largest(p.delassus);
   for (double& x : p.delassus) x = std::round(x / unit) * unit;
   const SolveResult r = solve(p);
