@@ -205,7 +205,6 @@ def impulses_on_the_cone(rng, mu: np.ndarray):
     return x, (kind == 1) & (mu > 0)
 
 
-@pytest.mark.xfail(not hasattr(ss, "certify"), raises=AttributeError, strict=True, reason="certify is yet to come")
 def test_the_backward_error_is_the_smallest_change_of_velocity_that_makes_an_impulse_exact():
     rng = np.random.default_rng(8)
     cases = []
@@ -236,7 +235,6 @@ def test_the_backward_error_is_the_smallest_change_of_velocity_that_makes_an_imp
             assert e < 1e-6 or oracles.natural_map(identity, w + k - r, [m], r)[0] > rounding
 
 
-@pytest.mark.xfail(not hasattr(ss, "certify"), raises=AttributeError, strict=True, reason="certify is yet to come")
 def test_the_numbers_of_a_certificate_are_their_definitions():
     rng = np.random.default_rng(10)
     for _ in range(1000):
@@ -259,7 +257,6 @@ def test_the_numbers_of_a_certificate_are_their_definitions():
         assert certificate.residual == certificate.residuals.max()
 
 
-@pytest.mark.xfail(not hasattr(ss, "certify"), raises=AttributeError, strict=True, reason="certify is yet to come")
 def test_the_direction_error_is_the_angle_between_friction_and_the_opposite_of_sliding():
     rng = np.random.default_rng(11)
     for _ in range(500):
