@@ -208,7 +208,8 @@ def change_values(rng: Rng, file: h5py.File) -> None:
     if rng.random() < 0.1:
         value = np.full_like(value, new)
     else:
-        value.reshape(-1)[rng.integers(value.size)] = new
+        with np.errstate(over="ignore"):
+            value.reshape(-1)[rng.integers(value.size)] = new
     _put(file, name, value)
 
 
@@ -312,8 +313,8 @@ def check(path: Path) -> bool:
         assert type(fclib.read(again)) is type(problem)
         again.unlink()
     if loaded is not None:
-        delassus = loaded.delassus
-        assert np.isfinite(getattr(delassus, "data", delassus)).all()
+        delassus = loaded.dense_delassus()
+        assert np.isfinite(delassus).all()
         assert delassus.shape == (3 * loaded.num_contacts, 3 * loaded.num_contacts)
         assert np.isfinite(loaded.free_velocity).all() and (loaded.friction >= 0).all()
     return problem is not None

@@ -38,10 +38,6 @@ def assert_equal(a: object, b: object) -> None:
         assert a == b
 
 
-def dense(problem: ss.ContactProblem) -> np.ndarray:
-    return problem.delassus.toarray() if sp.issparse(problem.delassus) else problem.delassus
-
-
 # Round trips
 
 
@@ -76,7 +72,7 @@ def test_saving_and_loading_a_contact_problem_changes_no_bit(tmp_path: Path, sto
     solution = ss.solve(problem)
     fclib.save(tmp_path / "p.hdf5", problem, storage=storage, title="Feet", solution=solution)
     again = fclib.load(tmp_path / "p.hdf5")
-    np.testing.assert_array_equal(dense(again), problem.delassus)
+    np.testing.assert_array_equal(again.dense_delassus(), problem.delassus)
     np.testing.assert_array_equal(again.free_velocity, problem.free_velocity)
     np.testing.assert_array_equal(again.friction, problem.friction)
     stored = fclib.read(tmp_path / "p.hdf5")
@@ -90,7 +86,7 @@ def test_a_problem_in_the_plane_stays_there(tmp_path: Path) -> None:
     fclib.write(tmp_path / "a.hdf5", planar)
     problem = fclib.load(tmp_path / "a.hdf5")
     assert problem.num_contacts == 4
-    G = dense(problem).copy()
+    G = problem.dense_delassus().copy()
     assert not G[1::3].any() and not G[:, 1::3].any() and not problem.free_velocity[1::3].any()
     keep = np.flatnonzero(np.arange(12) % 3 != 1)
     np.testing.assert_array_equal(G[np.ix_(keep, keep)], planar.W.toarray())
@@ -123,9 +119,10 @@ def test_large_sparse_problems_load() -> None:
     n = 150
     blocks = sp.block_diag([delassus(3, k) for k in range(n)], format="csr")
     problem = fclib.LocalProblem(blocks, np.ones(3 * n), np.full(n, 0.5)).to_contact_problem()
-    np.testing.assert_array_equal(dense(problem), blocks.toarray())
-    if hasattr(problem, "is_sparse"):
-        assert problem.is_sparse
+    assert problem.is_sparse
+    np.testing.assert_array_equal(problem.dense_delassus(), blocks.toarray())
+    full = fclib.LocalProblem(delassus(303), np.ones(303), np.full(101, 0.5)).to_contact_problem()
+    assert not full.is_sparse
 
 
 # What a file means
@@ -160,7 +157,7 @@ def test_the_normal_comes_first_in_a_file(tmp_path: Path) -> None:
     problem = fclib.load(path)
     #                  x  y  z (normal): the file's t1, t2, n
     assert problem.free_velocity.tolist() == [1, 2, 0, 11, 12, 10]
-    G = dense(problem)
+    G = problem.dense_delassus()
     assert G[2, 2] == 1e4  # n, n of contact 0: the file's first
     assert G[0, 0] == 1e4 + 2 * 11 and G[1, 1] == 1e4 + 2 * 22
     assert G[0, 1] == G[1, 0] == 12 + 21
@@ -220,7 +217,7 @@ def test_repeated_entries_add_up(tmp_path: Path) -> None:
         **{"W/i": [0, 1, 2, 0, 0], "W/p": [0, 1, 2, 0, 0], "W/x": [1.0, 2, 3, 10, 100]},
     }
     write_by_hand(path, "fclib_local", content)
-    np.testing.assert_array_equal(np.diag(dense(fclib.load(path))), [2, 3, 111])
+    np.testing.assert_array_equal(np.diag(fclib.load(path).dense_delassus()), [2, 3, 111])
     content |= {
         "W/nz": [-2],
         "W/nzmax": [6],
@@ -228,7 +225,7 @@ def test_repeated_entries_add_up(tmp_path: Path) -> None:
     }  # in a row, not sorted, with an entry that is not used
     content |= {"W/i": [0, 0, 0, 1, 2, 77], "W/x": [100.0, 10, 1, 2, 3, np.pi]}
     write_by_hand(path, "fclib_local", content)
-    np.testing.assert_array_equal(np.diag(dense(fclib.load(path))), [2, 3, 111])
+    np.testing.assert_array_equal(np.diag(fclib.load(path).dense_delassus()), [2, 3, 111])
 
 
 def test_other_number_types_and_scalars_without_dimension_are_read(tmp_path: Path) -> None:
@@ -275,9 +272,9 @@ def test_a_global_problem_is_the_local_one_of_its_masses(tmp_path: Path, spacedi
     W = H.T @ np.linalg.solve(M, H)
     q = H.T @ np.linalg.solve(M, problem.f) + problem.w
     keep = np.arange(9) if spacedim == 3 else np.flatnonzero(np.arange(9) % 3 != 1)
-    np.testing.assert_allclose(dense(loaded)[np.ix_(keep, keep)], W, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(loaded.dense_delassus()[np.ix_(keep, keep)], W, rtol=0, atol=1e-13)
     np.testing.assert_allclose(loaded.free_velocity[keep], q, rtol=0, atol=1e-13)
-    np.testing.assert_array_equal(dense(loaded), dense(loaded).T)
+    np.testing.assert_array_equal(loaded.dense_delassus(), loaded.dense_delassus().T)
 
 
 @pytest.mark.parametrize("local_first", [False, True])
@@ -293,14 +290,18 @@ def test_equality_constraints_are_eliminated_exactly(local_first: bool) -> None:
         return H.T @ v + problem.w
 
     for r in [np.zeros(9), *np.eye(9)]:
-        np.testing.assert_allclose(dense(reduced) @ r + reduced.free_velocity, velocity(r), rtol=0, atol=1e-12)
+        np.testing.assert_allclose(
+            reduced.dense_delassus() @ r + reduced.free_velocity, velocity(r), rtol=0, atol=1e-12
+        )
 
 
 def test_many_right_hand_sides_are_solved_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = global_problem(dofs=30, contacts=10)
     whole = problem.to_contact_problem()
     monkeypatch.setattr(fclib.elimination, "_COLUMNS", 7)
-    np.testing.assert_allclose(dense(problem.to_contact_problem()), dense(whole), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(
+        problem.to_contact_problem().dense_delassus(), whole.dense_delassus(), rtol=0, atol=1e-14
+    )
 
 
 def test_separate_bodies_give_a_sparse_operator() -> None:
@@ -344,7 +345,7 @@ def test_slight_asymmetry_is_mended_and_told() -> None:
         problem = fclib.LocalProblem(W, np.zeros(6), [0.5, 0.5])
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            G = dense(problem.to_contact_problem())
+            G = problem.to_contact_problem().dense_delassus()
         np.testing.assert_allclose([G[3, 4], G[4, 3]], size, rtol=1e-12)
         assert [w.category for w in caught] == [UserWarning] * told
         if told:

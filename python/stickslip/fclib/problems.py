@@ -200,15 +200,14 @@ def _contact_problem(W: sp.csr_array, q: Array, mu: Array, spacedim: int) -> Con
     if spacedim == 2:
         W, q, mu = planar_to_spatial(W, q, mu)
     problem = ContactProblem(_delassus(W), q, mu)
-    problem._spacedim = spacedim  # `save` writes the same again
+    problem._dimension = spacedim  # as `ContactProblem.planar` does, which is dense
     return problem
 
 
 def _delassus(W: sp.csr_array) -> Any:
     """In the form that is solved faster."""
     rows = W.shape[0]
-    sparse = rows > _SPARSE_ROWS and W.nnz < _SPARSE_DENSITY * rows**2
-    if sparse and hasattr(ContactProblem, "is_sparse"):
+    if rows > _SPARSE_ROWS and W.nnz < _SPARSE_DENSITY * rows**2:
         return sp.bsr_array(W, blocksize=(3, 3))
     return W.toarray()
 

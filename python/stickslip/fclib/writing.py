@@ -84,13 +84,13 @@ def save(
 ) -> None:
     """Writes a `ContactProblem`, and a solution of it, as a local problem.
 
-    spacedim: 2 for a problem in the plane x, z (ValueError if it is not in that plane); None: 2 for one that was read from such a
-    file, otherwise 3. Errors: see `write`.
+    spacedim: 2 for a problem in the plane x, z (ValueError if it is not in that plane); None: `problem.dimension`. Errors: see
+    `write`.
     """
     if not isinstance(problem, ContactProblem):
         raise TypeError(f"problem is a {type(problem).__name__}; a ContactProblem is wanted (or use write)")
     if spacedim is None:
-        spacedim = getattr(problem, "_spacedim", 3)
+        spacedim = problem.dimension
     local = LocalProblem.from_contact_problem(problem, spacedim=spacedim)
     stored = None
     if solution is not None:
