@@ -60,9 +60,8 @@ def check_cones(p: ss.ContactProblem, impulse: np.ndarray):
     x, mu = impulse.reshape(-1, 3), np.minimum(p.friction, 1e4)
     t = np.hypot(x[:, 0], x[:, 1])
     assert (x[:, 2] >= 0).all(), x
-    # Sweeps add up changes of impulses: what is left of them is rounding of the largest one.
-    rounding = 4 * oracles.UNIT * (1 + mu) * np.abs(x).max()
-    assert (t <= mu * x[:, 2] * (1 + 1e-12) + rounding).all(), f"{x} leaves the cones of {mu}"
+    # Squares of a friction of 1e-170 vanish: what is left of it is far below the rounding of an impulse.
+    assert (t <= (mu * (1 + 1e-14) + 1e-30) * x[:, 2] + 1e-300).all(), f"{x} leaves the cones of {mu}"
 
 
 def check_max_dissipation(p: ss.ContactProblem, s: ss.ContactSolution, limit: float):
@@ -95,6 +94,8 @@ def test_every_method_answers_every_problem_with_a_true_status(p, choice, limits
     check_cones(p, s.impulse)
     np.testing.assert_array_equal(s.contact_residuals, ss.residual(p, s.impulse, law=law))
     assert s.residual == s.contact_residuals.max()
+    if method != "auto":  # the start counts as found
+        assert s.residual <= ss.residual(p, np.zeros(3 * p.num_contacts), law=law).max()
     assert s.converged == (s.residual <= limit) == (s.status == "converged")
     if s.status == "infeasible":
         blocks = np.diagonal(p.delassus).reshape(-1, 3)
@@ -192,3 +193,13 @@ def test_asking_for_more_does_not_give_less():
         p = ss.ContactProblem(*oracles.stack(rng, 3, ratio=100))
         relative = [ss.solve(p, tolerance=0, relative_tolerance=r).residual for r in (1e-6, 1e-8, 1e-10, 1e-12)]
         assert max(relative[1:]) <= relative[0] + 1e-6 * np.abs(p.free_velocity).max()
+
+
+@pytest.mark.xfail(strict=True, reason="a cold start is not among what the chain compares")
+def test_a_problem_without_a_solution_gets_nothing_worse_than_no_impulse():
+    """A rail that jams: the contact moves along one line only, and friction holds it there while it is driven in."""
+    line = np.array([1.45, 0.54, 0.33])
+    p = ss.ContactProblem(np.outer(line, line), [1.0421, -0.6304, -1.0035], [1.123])
+    s = ss.solve(p)
+    assert not s.converged
+    assert s.residual <= ss.residual(p, np.zeros(3)).max()
