@@ -150,7 +150,7 @@ ContactProblem sphere_pile(std::uint64_t seed, const SpherePileOptions& o) {
   Pile pile(layers, o);
   for (int layer = 0; layer < layers; ++layer) pile.add_layer(layer, rng);
   pile.bodies().shake(noise, Pile::kRadius, rng);
-  return pile.bodies().problem(friction);
+  return pile.bodies().problem(friction, Storage::kBlockSparse);
 }
 
 ContactProblem brick_wall(std::uint64_t seed, const BrickWallOptions& o) {
@@ -191,7 +191,7 @@ ContactProblem brick_wall(std::uint64_t seed, const BrickWallOptions& o) {
     below = row;
   }
   wall.shake(noise, kLength, rng);
-  return wall.problem(friction);
+  return wall.problem(friction, Storage::kBlockSparse);
 }
 
 }  // namespace stickslip::scenes

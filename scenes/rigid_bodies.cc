@@ -70,7 +70,7 @@ RigidBodies::Rows RigidBodies::rows(const Contact& contact, int side) const {
   return rows;
 }
 
-ContactProblem RigidBodies::problem(double friction) const {
+ContactProblem RigidBodies::problem(double friction, Storage storage) const {
   struct Part {
     int contact;
     Rows y;  // J M^-1/2
@@ -102,8 +102,9 @@ ContactProblem RigidBodies::problem(double friction) const {
           for (int s = 0; s < 3; ++s)
             for (int k = 0; k < 6; ++k) block[3 * r + s] += a.y[r][k] * b.y[s][k];
       }
-  return delassus.problem(std::move(free_velocity),
-                          std::vector<double>(contacts_.size(), friction));
+  std::vector<double> mu(contacts_.size(), friction);
+  return storage == Storage::kDense ? delassus.dense_problem(std::move(free_velocity), std::move(mu))
+                                    : delassus.sparse_problem(std::move(free_velocity), std::move(mu));
 }
 
 }  // namespace stickslip::scenes

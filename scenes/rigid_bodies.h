@@ -14,6 +14,9 @@
 
 namespace stickslip::scenes {
 
+/// Form of a problem's Delassus operator.
+enum class Storage { kDense, kBlockSparse };
+
 class RigidBodies {
  public:
   static constexpr int kGround = -1;
@@ -44,7 +47,7 @@ class RigidBodies {
 
   /// The problem of one step of kProblemStep: free velocities after gravity and pushes, the same
   /// friction everywhere.
-  ContactProblem problem(double friction) const;
+  ContactProblem problem(double friction, Storage storage = Storage::kDense) const;
 
  private:
   struct Body {

@@ -46,14 +46,17 @@ std::optional<E> choice(const char* argument, const std::optional<std::string>& 
   return choice(argument, *text, words);
 }
 
-/// (delassus (3n, 3n), free velocity (3n,), friction (n,)).
+/// (delassus (3n, 3n) or (k, 3, 3), free velocity (3n,), friction (n,), block starts (n + 1), block columns
+/// (k)); the last two empty where it is dense.
 nb::tuple arrays_of(const ContactProblem& p) {
   const std::size_t rows = p.free_velocity.size();
   const auto copy = [&](std::span<double> to) {
     std::copy(p.delassus.begin(), p.delassus.end(), to.begin());
   };
-  return nb::make_tuple(make_array({rows, rows}, copy), copy_array(p.free_velocity),
-                        copy_array(p.friction));
+  const auto delassus = p.is_block_sparse() ? make_array({p.block_columns.size(), 3, 3}, copy)
+                                            : make_array({rows, rows}, copy);
+  return nb::make_tuple(delassus, copy_array(p.free_velocity), copy_array(p.friction),
+                        p.block_starts, p.block_columns);
 }
 
 using Number = std::optional<double>;

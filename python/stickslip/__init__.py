@@ -10,7 +10,7 @@ from stickslip import _cpu
 
 _cpu.check()
 
-from stickslip import assets  # noqa: E402
+from stickslip import assets, problems  # noqa: E402
 from stickslip._core import Model, ModelBuilder, ModelError, Pose, load_urdf, parse_urdf  # noqa: E402
 from stickslip.contact import (  # noqa: E402
     Certificate,
@@ -43,6 +43,7 @@ __all__ = [
     "certify",
     "load_urdf",
     "parse_urdf",
+    "problems",
     "residual",
     "solve",
     "solve_contact",

@@ -291,7 +291,13 @@ def _quadruped(family: str, seed: int, friction: float | None) -> ContactProblem
 
 
 def _problem(arrays: tuple[Any, ...]) -> ContactProblem:
-    return ContactProblem(*arrays)
+    delassus, free_velocity, friction, starts, columns = arrays
+    if starts:
+        from scipy import sparse
+
+        size = len(free_velocity)
+        delassus = sparse.bsr_array((delassus, columns, starts), shape=(size, size))
+    return ContactProblem(delassus, free_velocity, friction)
 
 
 def _optional(check: Callable[[str, Any], Any], name: str, value: Any) -> Any:

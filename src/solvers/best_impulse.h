@@ -32,13 +32,14 @@ class BestImpulse {
   }
 
   /// Takes p.lambda, projected on its cones, if its residual is the least so far; p.v is up to date
-  /// afterwards. True once an impulse within the tolerance has been seen.
-  bool offer(contact::ExplicitProblem& p, SolveStage stage) {
+  /// afterwards. True once an impulse within the tolerance has been seen. `recorded`: the history has
+  /// this point already.
+  bool offer(contact::ExplicitProblem& p, SolveStage stage, bool recorded = false) {
     project_on_cones(p);
     contact::refresh_velocity(p);
     last_ = largest_residual(p, max_dissipation_);
     if (!(last_ < __builtin_inf())) last_ = __builtin_inf();
-    record(stage, last_);
+    if (!recorded) record(stage, last_);
     if (last_ < residual_ || impulse_.empty()) {
       residual_ = last_;
       stage_ = stage;

@@ -110,14 +110,14 @@ class Chain {
     double before = INFINITY;
     for (int k = 1; k <= kMost && k <= max_sweeps_; ++k) {
       const double change = sweep();
-      if (change <= tolerance && best_.offer(p_, SolveStage::kSweeps)) return true;
+      if (change <= tolerance && best_.offer(p_, SolveStage::kSweeps, true)) return true;
       if (k >= 2 && (k >= 5 || change * change > tolerance * before)) {
         // Late steps are more cautious.
         if (newton.step(k < 8 ? 1e-6 : 1e-5) && best_.offer(p_, SolveStage::kNewton)) return true;
       }
       before = change;
     }
-    return best_.offer(p_, SolveStage::kSweeps);
+    return best_.offer(p_, SolveStage::kSweeps, true);
   }
 
   /// Sweeps for as long as a block of them halves their change.
@@ -127,13 +127,13 @@ class Chain {
     double last = INFINITY;
     for (int k = 1; k <= max_sweeps_; ++k) {
       const double change = sweep();
-      if (change <= best_.tolerance() && best_.offer(p_, SolveStage::kSweeps)) return true;
+      if (change <= best_.tolerance() && best_.offer(p_, SolveStage::kSweeps, true)) return true;
       if (k % block != 0) continue;
-      if (best_.offer(p_, SolveStage::kSweeps)) return true;
+      if (best_.offer(p_, SolveStage::kSweeps, true)) return true;
       if (!(best_.last_residual() < 0.5 * last)) break;
       last = best_.last_residual();
     }
-    return best_.offer(p_, SolveStage::kSweeps);
+    return best_.offer(p_, SolveStage::kSweeps, true);
   }
 
   bool relaxed_sweeps() {

@@ -66,7 +66,7 @@ void inverse_square(const Scaling& s, double out[9]) {
 }
 
 constexpr double kSmallestFriction = 1e-9;  // a cone without friction has no interior
-constexpr int kPatience = 15;               // iterations without a better impulse
+constexpr int kPatience = 45;               // iterations without a better impulse
 
 }  // namespace
 

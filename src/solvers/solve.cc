@@ -63,7 +63,7 @@ void run_sweeps(ExplicitProblem& p, const SolveOptions& o, BestImpulse& best, Ef
   }
   effort.sweeps +=
       (o.method == SolveMethod::kPgs ? contact::pgs(p, s) : contact::per_contact(p, s)).sweeps;
-  best.offer(p, SolveStage::kSweeps);
+  best.offer(p, SolveStage::kSweeps, true);
 }
 
 void run_method(ExplicitProblem& p, const SolveOptions& o, BestImpulse& best, Effort& effort) {

@@ -19,7 +19,7 @@ bool finite(const SolveResult& r) {
   const auto all = [](const std::vector<double>& x) {
     return std::all_of(x.begin(), x.end(), [](double e) { return std::isfinite(e); });
   };
-  return all(r.impulse) && all(r.velocity) && all(r.contact_residuals) && std::isfinite(r.residual);
+  return all(r.impulse) && all(r.velocity) && all(r.certificate.residuals) && std::isfinite(r.certificate.residual);
 }
 
 }  // namespace
@@ -51,12 +51,20 @@ TEST(BadOptionsAndImpulsesAreNamed) {
   SolveOptions o;
   o.tolerance = 0;
   CHECK_THROWS(solve(p, o), ModelError, "tolerance");
+  o = {}, o.relative_tolerance = -1;
+  CHECK_THROWS(solve(p, o), ModelError, "relative_tolerance is -1");
+  o = {}, o.max_iterations = -1;
+  CHECK_THROWS(solve(p, o), ModelError, "max_iterations is -1");
+  o = {}, o.proximal_weight = 0;
+  CHECK_THROWS(solve(p, o), ModelError, "proximal_weight is 0");
+  o = {}, o.law = FrictionLaw::kMaxDissipation, o.minimum_norm = true;
+  CHECK_THROWS(solve(p, o), ModelError, "minimum_norm is for law coulomb");
   o = {}, o.max_sweeps = 0;
   CHECK_THROWS(solve(p, o), ModelError, "max_sweeps");
   o = {}, o.alpha = kNan;
   CHECK_THROWS(solve(p, o), ModelError, "alpha");
   o = {}, o.method = SolveMethod::kPgs, o.law = FrictionLaw::kMaxDissipation;
-  CHECK_THROWS(solve(p, o), ModelError, "pgs solves law coulomb only");
+  CHECK_THROWS(solve(p, o), ModelError, "solves law coulomb only");
   o = {}, o.method = SolveMethod::kPerContact,
   o.single_contact = SingleContactMethod::kGoldenSection;
   CHECK_THROWS(solve(p, o), ModelError, "golden_section minimizes the energy");
@@ -74,12 +82,15 @@ TEST(AHistoryIsAsLongAsTheSolveWhateverTheCap) {
   o.method = SolveMethod::kPerContact, o.record_history = true;
   o.max_sweeps = std::numeric_limits<int>::max();
   const SolveResult r = solve(block(), o);
-  CHECK(int(r.history.size()) == r.sweeps && r.sweeps < 100);
+  CHECK(int(r.history.size()) == r.sweeps + 1 && r.sweeps < 100);  // and the start
+  for (std::size_t k = 1; k < r.history.size(); ++k)
+    CHECK(r.history[k].time >= r.history[k - 1].time);
+  CHECK(r.history.back().residual <= o.tolerance);
 }
 
 TEST(AProblemWithoutContactsIsSolved) {
   const SolveResult r = solve({}, {});
-  CHECK(r.status == SolveStatus::kConverged && r.impulse.empty() && r.residual == 0);
+  CHECK(r.status == SolveStatus::kConverged && r.impulse.empty() && r.certificate.residual == 0);
 }
 
 TEST(AutoSolvesEveryRobotScene) {
@@ -113,7 +124,7 @@ TEST(TowersAndTheirMassRatiosAreSolved) {
           problems::duplicate(problems::box_stack({1, ratio, 1}, 0.5, 2), copies);
       const SolveResult r = solve(p);
       std::printf("  1 : %g : 1, %d copies: residual %.1e, sweeps %d, Newton steps %d\n", ratio,
-                  copies, r.residual, r.sweeps, r.newton_steps);
+                  copies, r.certificate.residual, r.sweeps, r.newton_steps);
       CHECK(r.status == SolveStatus::kConverged);
       // The ground carries the weight.
       double weight = 0;
@@ -157,7 +168,7 @@ TEST(AContactThatCannotPushIsReported) {
       SolveOptions o;
       o.method = method, o.law = law, o.max_sweeps = 20;
       const SolveResult r = solve(p, o);
-      CHECK(finite(r) && r.status == SolveStatus::kInfeasible && r.residual > 1);
+      CHECK(finite(r) && r.status == SolveStatus::kInfeasible && r.certificate.residual > 1);
     }
   p.free_velocity[2] = 3;  // moving away: nothing is asked of it
   CHECK(solve(p).status == SolveStatus::kConverged);
@@ -178,7 +189,7 @@ TEST(AStatusNeverClaimsMoreThanTheResidual) {
       CHECK(finite(r));
       CHECK((r.status == SolveStatus::kConverged) ==
             (problems::largest(residual(p, r.impulse)) <= o.tolerance));
-      CHECK(r.residual <= problems::largest(residual(p, std::vector<double>(r.impulse.size()))));
+      CHECK(r.certificate.residual <= problems::largest(residual(p, std::vector<double>(r.impulse.size()))));
     }
   }
 }
@@ -282,7 +293,7 @@ TEST(AJammedContactIsFiniteAndNotCalledSolved) {
       o.method = method;
       const SolveResult r = solve(p, o);
       CHECK(finite(r));
-      CHECK((r.status == SolveStatus::kConverged) == (r.residual <= o.tolerance));
+      CHECK((r.status == SolveStatus::kConverged) == (r.certificate.residual <= o.tolerance));
       SingleContactOptions single;
       const auto s = solve_contact(p.delassus.data(), p.free_velocity.data(), mu, single);
       CHECK(std::isfinite(s.impulse[0]) && std::isfinite(s.impulse[2]));
@@ -297,10 +308,10 @@ TEST(MatricesRoundedToFewDigitsAreSolvedAsTheyAre) {
   const double unit = 1e-7 * problems::largest(p.delassus);
   for (double& x : p.delassus) x = std::round(x / unit) * unit;
   const SolveResult r = solve(p);
-  std::printf("  residual %.1e, sweeps %d, Newton steps %d\n", r.residual, r.sweeps,
+  std::printf("  residual %.1e, sweeps %d, Newton steps %d\n", r.certificate.residual, r.sweeps,
               r.newton_steps);
-  CHECK(finite(r) && r.residual <= 1e-6);
-  CHECK((r.status == SolveStatus::kConverged) == (r.residual <= 1e-9));
+  CHECK(finite(r) && r.certificate.residual <= 1e-6);
+  CHECK((r.status == SolveStatus::kConverged) == (r.certificate.residual <= 1e-9));
 }
 
 TEST(AContactOnARailSlidesIfItsNormalVelocityIsPrescribed) {
