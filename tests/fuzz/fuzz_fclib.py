@@ -371,6 +371,7 @@ def main() -> None:
     print(f"files in {folder}", flush=True)
     if options.atheris:
         _atheris(folder, rest)
+    faulthandler.enable()
     problems = 0
     cases = (
         itertools.count(options.seed) if options.count is None else range(options.seed, options.seed + options.count)
