@@ -33,6 +33,14 @@ enum class SolveMethod {
   kAdmm,           ///< alternating directions with De Saxce's shift, [Carpentier 2024]
 };
 
+/// How interior-point steps treat De Saxce's shift mu |v_T|, what makes Coulomb's law more than a convex
+/// problem.
+enum class ShiftRule {
+  kLagged,  ///< from the last iterate: every step is one of a convex problem
+  kDamped,  ///< half way from the last one: where lagging oscillates (large friction)
+  kExact,   ///< linearized: fastest near a solution, may stop far from one
+};
+
 /// What found the impulse that a solve returns.
 enum class SolveStage {
   kStart,          ///< the warm start, or rest
@@ -106,6 +114,7 @@ struct SolveOptions {
   bool minimum_norm = false;
   /// kProxNewton: proximal weight of the first subproblem, relative to G_ii; > 0.
   double proximal_weight = 1e-3;
+  ShiftRule shift = ShiftRule::kLagged;  ///< kInteriorPoint
   /// kPerContact only. kGoldenSection minimizes an energy, so it knows kMaxDissipation only.
   SingleContactMethod single_contact = SingleContactMethod::kHalley;
   double single_contact_tolerance =

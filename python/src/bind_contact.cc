@@ -21,6 +21,11 @@ constexpr Word<StopTest> kStopTests[] = {
     {"violation_sum", StopTest::kViolationSum},
     {"update_sum", StopTest::kUpdateSum},
 };
+constexpr Word<ShiftRule> kShiftRules[] = {
+    {"lagged", ShiftRule::kLagged},
+    {"damped", ShiftRule::kDamped},
+    {"exact", ShiftRule::kExact},
+};
 constexpr Word<SolveStatus> kSolveStatuses[] = {
     {"converged", SolveStatus::kConverged},
     {"iteration_limit", SolveStatus::kIterationLimit},
@@ -50,6 +55,7 @@ SolveOptions options_of(const nb::dict& d) {
   o.max_iterations = nb::cast<int>(d["max_iterations"]);
   o.minimum_norm = nb::cast<bool>(d["minimum_norm"]);
   o.proximal_weight = nb::cast<double>(d["proximal_weight"]);
+  o.shift = choice("shift", text("shift"), kShiftRules);
   o.single_contact = choice("single_contact", text("single_contact"), kSingleContactMethods);
   o.single_contact_tolerance = nb::cast<double>(d["single_contact_tolerance"]);
   o.alpha = nb::cast<double>(d["alpha"]);

@@ -1,5 +1,6 @@
 #include "solvers/chain.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "contact/per_contact.h"
@@ -43,51 +44,26 @@ double visit(ExplicitProblem& p, int i, double speed, double direction[2]) {
 class Chain {
  public:
   Chain(ExplicitProblem& p, BestImpulse& best, int max_sweeps, Effort& effort)
-      : p_(p), best_(best), max_sweeps_(max_sweeps), effort_(effort), directions_(2 * p.n) {}
+      : p_(p), best_(best), max_sweeps_(max_sweeps), effort_(effort), directions_(2 * p.n), newton_(p) {}
 
   void run() {
-    if (sweeps_with_newton() || patient_sweeps()) return;
+    if (p_.n <= kRobotSized ? sweeps_with_newton() : patient_sweeps()) return;
     // What is left is hyperstatic, ill-conditioned or large.
-    ProxNewton newton(p_);
-    Counted counted(newton, effort_);
-    const auto from_best = [&](double alpha, int steps) {
-      best_.restore(p_);
-      return newton.run(best_, alpha, steps);
-    };
-    if (from_best(1e-3, 60)) return;
-    for (const Shift shift : {Shift::kLagged, Shift::kExact, Shift::kDamped}) {
+    if (proximal_newton(best_.impulse(), 1e-3, 60)) return;
+    for (const ShiftRule shift : {ShiftRule::kLagged, ShiftRule::kExact, ShiftRule::kDamped})
       if (interior_point(shift)) return;
-      // Its last impulse knows the active set; small weights keep it.
-      const std::vector<double> end(p_.lambda, p_.lambda + 3 * p_.n);
-      for (const double alpha : {1e-8, 1e-5}) {
-        put(end);
-        if (newton.run(best_, alpha, 40)) return;
-      }
+    if (admm(2000)) return;
+    for (const double alpha : {1e-1, 1e-5, 1e-2}) {
+      if (stubborn_sweeps(alpha < 1e-3 ? 1 : 0.7)) return;
+      if (proximal_newton(best_.impulse(), alpha, 150)) return;
     }
-    for (const double alpha : {1e-1, 1e-5}) {
-      if (from_best(alpha, 150)) return;
-      if (relaxed_sweeps()) return;
-    }
-    put(std::vector<double>(3 * p_.n));
-    if (newton.run(best_, 1.0, 150)) return;
-    if (admm(3000)) return;
-    newton.run(best_, 1e-2, 300);
+    proximal_newton(std::vector<double>(3 * p_.n), 1.0, 150);
+    // The best impulse may still be worse than none.
+    std::fill(p_.lambda, p_.lambda + 3 * p_.n, 0.0);
+    best_.offer(p_, SolveStage::kStart);
   }
 
  private:
-  /// Adds the steps of a ProxNewton to the effort when it goes out of scope.
-  struct Counted {
-    Counted(const ProxNewton& newton, Effort& effort) : newton(newton), effort(effort) {}
-    ~Counted() { effort.newton_steps += newton.steps(); }
-    const ProxNewton& newton;
-    Effort& effort;
-  };
-
-  void put(const std::vector<double>& impulse) {
-    for (int r = 0; r < 3 * p_.n; ++r) p_.lambda[r] = impulse[r];
-    contact::refresh_velocity(p_);
-  }
-
   /// The largest velocity change of a sweep [m/s].
   double sweep() {
     const double speed = 0.01 * best_.tolerance();
@@ -102,55 +78,68 @@ class Chain {
 
   /// Sweeps, and Newton steps where the next sweep is not expected to converge.
   bool sweeps_with_newton() {
-    if (p_.n > kRobotSized) return false;
     constexpr int kMost = 16;
-    ProxNewton newton(p_);
-    Counted counted(newton, effort_);
     const double tolerance = best_.tolerance();
     double before = INFINITY;
     for (int k = 1; k <= kMost && k <= max_sweeps_; ++k) {
       const double change = sweep();
       if (change <= tolerance && best_.offer(p_, SolveStage::kSweeps, true)) return true;
       if (k >= 2 && (k >= 5 || change * change > tolerance * before)) {
+        ++effort_.newton_steps;
         // Late steps are more cautious.
-        if (newton.step(k < 8 ? 1e-6 : 1e-5) && best_.offer(p_, SolveStage::kNewton)) return true;
+        if (newton_.step(k < 8 ? 1e-6 : 1e-5) && best_.offer(p_, SolveStage::kNewton)) return true;
       }
       before = change;
     }
-    return best_.offer(p_, SolveStage::kSweeps, true);
+    return best_.offer(p_, SolveStage::kSweeps);
   }
 
-  /// Sweeps for as long as a block of them halves their change.
+  /// Sweeps for as long as a block of them is worth it. A sweep of a large problem costs a hundredth of a Newton
+  /// step.
   bool patient_sweeps() {
-    const int block = 8;
-    if (!best_.impulse().empty()) best_.restore(p_);
+    constexpr int kBlock = 25;
+    constexpr double kGain = 0.7;
     double last = INFINITY;
     for (int k = 1; k <= max_sweeps_; ++k) {
       const double change = sweep();
-      if (change <= best_.tolerance() && best_.offer(p_, SolveStage::kSweeps, true)) return true;
-      if (k % block != 0) continue;
+      if (k % kBlock != 0 && change > best_.tolerance()) continue;
       if (best_.offer(p_, SolveStage::kSweeps, true)) return true;
-      if (!(best_.last_residual() < 0.5 * last)) break;
+      if (k % kBlock != 0) continue;
+      if (!(best_.last_residual() < kGain * last)) break;
       last = best_.last_residual();
     }
     return best_.offer(p_, SolveStage::kSweeps, true);
   }
 
-  bool relaxed_sweeps() {
+  /// Relaxed or plain, from the best impulse, whether or not they seem to gain.
+  bool stubborn_sweeps(double relaxation) {
     best_.restore(p_);
     contact::SweepOptions o;
     o.tolerance = best_.tolerance();
-    o.max_sweeps = max_sweeps_ < 100 ? max_sweeps_ : 100;
-    o.alpha = 0.7;
+    o.max_sweeps = max_sweeps_;
+    o.alpha = relaxation;
     effort_.sweeps += contact::per_contact(p_, o).sweeps;
     return best_.offer(p_, SolveStage::kSweeps);
   }
 
-  bool interior_point(Shift shift) {
+  bool proximal_newton(const std::vector<double>& start, double alpha, int steps) {
+    std::copy(start.begin(), start.end(), p_.lambda);
+    const int before = newton_.steps();
+    const bool solved = newton_.run(best_, alpha, steps);
+    effort_.newton_steps += newton_.steps() - before;
+    return solved;
+  }
+  /// Small weights keep what a method has found out about which contacts are open, stick and slide.
+  bool polish() {
+    const std::vector<double> end(p_.lambda, p_.lambda + 3 * p_.n);
+    return proximal_newton(end, 1e-8, 40) || proximal_newton(end, 1e-5, 40);
+  }
+
+  bool interior_point(ShiftRule shift) {
     InteriorPoint method(p_);
     const bool solved = method.run(best_, shift, 80);
     effort_.interior_point_steps += method.iterations();
-    return solved;
+    return solved || polish();
   }
 
   bool admm(int iterations) {
@@ -158,7 +147,7 @@ class Chain {
     Admm method(p_);
     const bool solved = method.run(best_, iterations);
     effort_.admm_iterations += method.iterations();
-    return solved;
+    return solved || polish();
   }
 
   ExplicitProblem& p_;
@@ -166,6 +155,7 @@ class Chain {
   int max_sweeps_;
   Effort& effort_;
   std::vector<double> directions_;
+  ProxNewton newton_;
 };
 
 void run_max_dissipation(ExplicitProblem& p, BestImpulse& best, int max_sweeps, Effort& effort) {

@@ -97,7 +97,7 @@ void InteriorPoint::start() {
 }
 
 /// lambda = D x, v from it, and what y lacks: F = D v + shift - y.
-void InteriorPoint::evaluate(Shift shift, bool first) {
+void InteriorPoint::evaluate(ShiftRule shift, bool first) {
   std::fill(p_.lambda, p_.lambda + 3 * p_.n, 0.0);
   for (std::size_t a = 0; a < active_.size(); ++a)
     for (int r = 0; r < 3; ++r)
@@ -105,7 +105,7 @@ void InteriorPoint::evaluate(Shift shift, bool first) {
   contact::refresh_velocity(p_);
   for (std::size_t a = 0; a < active_.size(); ++a) {
     const double t = tangential(y_.data() + 3 * a);
-    shift_[a] = shift == Shift::kDamped ? (first ? 0 : 0.5 * (shift_[a] + t)) : t;
+    shift_[a] = shift == ShiftRule::kDamped ? (first ? 0 : 0.5 * (shift_[a] + t)) : t;
     for (int r = 0; r < 3; ++r)
       F_[3 * a + r] = D_[2 * a + (r == 2)] * p_.v[3 * active_[a] + r] +
                       (r == 2 ? shift_[a] : 0) - y_[3 * a + r];
@@ -113,7 +113,7 @@ void InteriorPoint::evaluate(Shift shift, bool first) {
 }
 
 /// (D G D + C S^-2) in the unknown dlambda = D dx, with C = 1 - z t^T where the shift is exact.
-bool InteriorPoint::factor(Shift shift) {
+bool InteriorPoint::factor(ShiftRule shift) {
   for (std::size_t a = 0; a < active_.size(); ++a) {
     const double *x = x_.data() + 3 * a, *y = y_.data() + 3 * a;
     const Scaling s = scaling(x, y);
@@ -123,7 +123,7 @@ bool InteriorPoint::factor(Shift shift) {
     double* A = A_.data() + 9 * active_[a];
     double* B = B_.data() + 9 * active_[a];
     inverse_square(s, A);
-    if (const double t = tangential(y); shift == Shift::kExact && t > 0)
+    if (const double t = tangential(y); shift == ShiftRule::kExact && t > 0)
       for (int c = 0; c < 3; ++c) A[6 + c] -= (y[0] * A[c] + y[1] * A[3 + c]) / t;
     for (int r = 0; r < 3; ++r)
       for (int c = 0; c < 3; ++c) {
@@ -167,10 +167,10 @@ double InteriorPoint::longest_step() const {
   return t;
 }
 
-bool InteriorPoint::run(BestImpulse& best, Shift shift, int max_iterations) {
+bool InteriorPoint::run(BestImpulse& best, ShiftRule shift, int max_iterations) {
   const std::size_t m = x_.size();
   if (m == 0) return best.solved();
-  exact_ = shift == Shift::kExact;
+  exact_ = shift == ShiftRule::kExact;
   start();
   double least = INFINITY;
   std::vector<double> complementarity(m);

@@ -5,7 +5,7 @@
 // Scaled per contact, x = E^-1 D^-1 lambda and y = D E (v + mu |v_T| z) lie in the same self-dual cone
 // {x_z >= |x_T|}; a solution has x o y = 0. Steps of Nesterov and Todd with Mehrotra's corrector follow
 // x o y = tau e to tau = 0. De Saxce's shift mu |v_T| is what makes Coulomb's law more than a convex
-// problem; how it enters a step is the one choice (`Shift`).
+// problem; how it enters a step is the one choice (`ShiftRule`).
 #pragma once
 #include <vector>
 
@@ -15,26 +15,19 @@
 
 namespace stickslip::solvers {
 
-/// How the steps treat the shift mu |v_T|.
-enum class Shift {
-  kLagged,  ///< from the last iterate: every step is one of a convex problem
-  kDamped,  ///< half way from the last one: where lagging oscillates (large friction)
-  kExact,   ///< linearized: fastest near a solution, may stop far from one
-};
-
 class InteriorPoint {
  public:
   explicit InteriorPoint(contact::ExplicitProblem& p);
 
   /// Starts from its own interior point, offers every iterate. True once solved; at most
   /// `max_iterations`. Leaves p.lambda at the best of its iterates, p.v up to date.
-  bool run(BestImpulse& best, Shift shift, int max_iterations);
+  bool run(BestImpulse& best, ShiftRule shift, int max_iterations);
   int iterations() const { return iterations_; }
 
  private:
   void start();
-  void evaluate(Shift shift, bool first);
-  bool factor(Shift shift);
+  void evaluate(ShiftRule shift, bool first);
+  bool factor(ShiftRule shift);
   void step_direction(const std::vector<double>& complementarity);
   double longest_step() const;
 

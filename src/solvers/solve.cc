@@ -82,7 +82,7 @@ void run_method(ExplicitProblem& p, const SolveOptions& o, BestImpulse& best, Ef
     }
     case SolveMethod::kInteriorPoint: {
       solvers::InteriorPoint method(p);
-      method.run(best, solvers::Shift::kLagged, limit(100));
+      method.run(best, o.shift, limit(100));
       effort.interior_point_steps = method.iterations();
       return;
     }
