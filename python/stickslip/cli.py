@@ -6,8 +6,11 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import get_args
 
 from stickslip import __version__
+from stickslip.contact import SOLVE_METHODS, Law
+from stickslip.problems import FAMILIES
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -31,13 +34,77 @@ def _parser() -> argparse.ArgumentParser:
         help="exit status 1 if the run misses what Tables I and II claim, times among it",
     )
     paper.set_defaults(run=_paper)
+    _add_solve(commands)
     return parser
+
+
+def _add_solve(commands: argparse._SubParsersAction) -> None:
+    solve = commands.add_parser(
+        "solve",
+        help="solve contact problems with one or several methods and compare them",
+        description="Solves contact problems of FCLIB files, or generated ones, and prints a table of times and residuals. "
+        "Exit status: 0 if everything was read and solved, 1 if something was not solved to the tolerance, 2 for bad input.",
+    )
+    solve.add_argument("files", nargs="*", metavar="FILE", help="FCLIB file, folder of *.hdf5 files, or quoted pattern")
+    solve.add_argument(
+        "--method",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="NAME",
+        help=f"{', '.join(SOLVE_METHODS)}, or all (default: auto); files come before this option, or behind --",
+    )
+    solve.add_argument("--law", choices=get_args(Law), default="coulomb", help="friction law (default: %(default)s)")
+    solve.add_argument(
+        "--tolerance", type=float, default=0.0, metavar="X", help="on the residual [m/s] (default: %(default)s)"
+    )
+    solve.add_argument(
+        "--relative-tolerance",
+        type=float,
+        default=1e-8,
+        metavar="X",
+        help="added to it: this much of the largest free velocity max|c| (default: %(default)s)",
+    )
+    solve.add_argument("--max-sweeps", type=int, metavar="N", help="limit of auto, per_contact and pgs (default: 1000)")
+    solve.add_argument(
+        "--max-iterations",
+        type=int,
+        metavar="N",
+        help="limit of prox_newton, interior_point and admm (default: the method's own)",
+    )
+    solve.add_argument("--minimum-norm", action="store_true", help="of equivalent impulses take the smallest")
+    solve.add_argument(
+        "--plot",
+        type=Path,
+        metavar="PNG",
+        help="picture: residual over time for up to 6 problems, a performance profile for more",
+    )
+    solve.add_argument("--csv", type=Path, metavar="FILE", help="write the table with all digits")
+    solve.add_argument(
+        "--family",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="generated problems, may be repeated; with options: box_stack,mass_ratio=1e4. "
+        f"Families: {', '.join(FAMILIES)}",
+    )
+    solve.add_argument(
+        "--count", type=int, default=10, metavar="N", help="problems of each family (default: %(default)s)"
+    )
+    solve.add_argument("--seed", type=int, default=0, metavar="S", help="of a family's first problem (default: 0)")
+    solve.set_defaults(run=_solve)
 
 
 def _paper(arguments: argparse.Namespace) -> int:
     from stickslip import paper  # matplotlib and rich load here, and only here
 
     return int(paper.run(output=arguments.output, full=arguments.full, check=arguments.check) or 0)
+
+
+def _solve(arguments: argparse.Namespace) -> int:
+    from stickslip.compare_solvers.command import solve_command
+
+    return solve_command(arguments)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
