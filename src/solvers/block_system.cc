@@ -8,30 +8,55 @@ namespace stickslip::solvers {
 BlockSystem::BlockSystem() = default;
 BlockSystem::~BlockSystem() = default;
 
+/// Rows are `stride` apart. Three rows at a time, over runs of contacts that follow each other in G.
 void BlockSystem::assemble_dense(const contact::ExplicitProblem& p, const std::vector<int>& active,
-                                 const double* A, const double* B) {
-  const int n = int(active.size()), m = size_;
-  matrix_.resize(size_t(m) * m);
-  pivot_.resize(m);
-  double* __restrict__ out = matrix_.data();
+                                 const double* A, const double* B, int stride) {
+  const int n = int(active.size());
+  matrix_.resize(size_t(size_) * stride + kRowChunk);
   for (int a = 0; a < n; ++a) {
-    const int i = active[a];
-    const double* b = B + 9L * i;
-    double* row = out + 3L * a * m;
-    if (p.starts)
-      for (int k = 0; k < 3 * m; ++k) row[k] = 0;
-    int position = 0;
-    contact::for_each_block(p, i, [&](int j, const double* g, int stride) {
-      while (position < n && active[position] < j) ++position;
-      if (position == n || active[position] != j) return;
-      double* to = row + 3 * position;
-      for (int r = 0; r < 3; ++r)
-        for (int s = 0; s < 3; ++s)
-          to[r * m + s] = madd(b[3 * r], g[s], madd(b[3 * r + 1], g[stride + s], b[3 * r + 2] * g[2 * stride + s]));
-    });
+    const double* b = B + 9L * active[a];
+    double* row = matrix_.data() + 3L * a * stride;
+    // columns [first, first + count) of the system are `from` and what follows in rows of G.
+    const auto multiply = [&](int first, int count, const double* from, int apart) {
+      for (int r = 0; r < 3; ++r) {
+        double* __restrict__ to = row + long(r) * stride + first;
+        const double *__restrict__ g0 = from, *__restrict__ g1 = from + apart,
+                     *__restrict__ g2 = g1 + apart;
+        const double b0 = b[3 * r], b1 = b[3 * r + 1], b2 = b[3 * r + 2];
+        for (int k = 0; k < count; ++k) to[k] = madd(b0, g0[k], madd(b1, g1[k], b2 * g2[k]));
+      }
+    };
+    if (p.starts) {
+      for (long k = 0; k < 3L * stride; ++k) row[k] = 0;
+      int position = 0;
+      contact::for_each_block(p, active[a], [&](int j, const double* g, int apart) {
+        while (position < n && active[position] < j) ++position;
+        if (position < n && active[position] == j) multiply(3 * position, 3, g, apart);
+      });
+    } else {
+      for (int first = 0, last; first < n; first = last) {
+        for (last = first + 1; last < n && active[last] == active[last - 1] + 1;) ++last;
+        multiply(3 * first, 3 * (last - first), p.row(3 * active[a]) + 3 * active[first], 3 * p.n);
+      }
+    }
     for (int r = 0; r < 3; ++r)
-      for (int s = 0; s < 3; ++s) row[r * m + 3 * a + s] += A[9L * i + 3 * r + s];
+      for (int s = 0; s < 3; ++s) row[long(r) * stride + 3 * a + s] += A[9L * active[a] + 3 * r + s];
   }
+}
+
+bool BlockSystem::solve_once(const contact::ExplicitProblem& p, const std::vector<int>& active,
+                             const double* A, const double* B, double* x) {
+  size_ = 3 * int(active.size());
+  if (size_ > kDenseRows) {
+    if (!factor(p, active, A, B)) return false;
+    solve(x);
+    return true;
+  }
+  const int stride = padded_row(size_ + 1);
+  assemble_dense(p, active, A, B, stride);
+  for (int i = 0; i < size_; ++i) matrix_[size_t(i) * stride + size_] = x[i];
+  eliminate(matrix_.data(), size_, stride, x);
+  return true;
 }
 
 bool BlockSystem::factor(const contact::ExplicitProblem& p, const std::vector<int>& active,
@@ -42,7 +67,8 @@ bool BlockSystem::factor(const contact::ExplicitProblem& p, const std::vector<in
     if (!library_) library_ = std::make_unique<LargeSystem>();
     return library_->factor(p, active, A, B);
   }
-  assemble_dense(p, active, A, B);
+  pivot_.resize(size_);
+  assemble_dense(p, active, A, B, size_);
   factor_lu(matrix_.data(), size_, size_, pivot_.data());
   return true;
 }

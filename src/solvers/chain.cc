@@ -69,7 +69,7 @@ class Chain {
     const double speed = 0.01 * best_.tolerance();
     double change = 0;
     for (int i = 0; i < p_.n; ++i)
-      change = std::fmax(change, visit(p_, i, speed, directions_.data() + 2 * i));
+      change = std::max(change, visit(p_, i, speed, directions_.data() + 2 * i));
     ++effort_.sweeps;
     change = std::sqrt(change);
     if (best_.records()) best_.record(SolveStage::kSweeps, largest_residual(p_, false));

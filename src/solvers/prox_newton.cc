@@ -14,14 +14,14 @@ constexpr double kSmallestAlpha = 1e-12, kLargestAlpha = 1e5;
 }  // namespace
 
 ProxNewton::ProxNewton(contact::ExplicitProblem& p)
-    : p_(p),
-      center_(3 * p.n),
-      origin_(3 * p.n),
-      direction_(3 * p.n),
-      u_(3 * p.n),
-      A_(9 * p.n),
-      B_(9 * p.n),
-      F_(3 * p.n) {
+    : p_(p), memory_(std::make_unique_for_overwrite<double[]>(33 * std::size_t(p.n) + 1)) {
+  double* next = memory_.get();
+  for (double** vector : {&center_, &origin_, &direction_, &u_, &F_}) {
+    *vector = next;
+    next += 3L * p.n;
+  }
+  A_ = next;
+  B_ = next + 9L * p.n;
   active_.reserve(p.n);
 }
 
@@ -38,7 +38,7 @@ double ProxNewton::merit() {
   double sum = 0;
   for (int i = 0; i < p_.n; ++i) {
     double F[3];
-    alart_curnier_value(p_.local[i], p_.lambda + 3 * i, u_.data() + 3 * i, F);
+    alart_curnier_value(p_.local[i], p_.lambda + 3 * i, u_ + 3 * i, F);
     sum += squared(F);
   }
   return std::sqrt(sum);
@@ -51,7 +51,7 @@ bool ProxNewton::direction(double alpha) {
   bool some_leave = false;
   for (int i = 0; i < p_.n; ++i) {
     AlartCurnier c;
-    alart_curnier(p_.local[i], p_.lambda + 3 * i, u_.data() + 3 * i, c);
+    alart_curnier(p_.local[i], p_.lambda + 3 * i, u_ + 3 * i, c);
     const double weight = alpha * p_.local[i].scale;
     for (int r = 0; r < 9; ++r) {
       A_[9 * i + r] = c.A[r] + weight * c.B[r];
@@ -68,7 +68,7 @@ bool ProxNewton::direction(double alpha) {
       B_[9 * i + r] = direction_[3 * i + r];  // kept for the right-hand side
     }
   }
-  std::vector<double>& x = origin_;  // 3 active numbers; the caller saves origin_ afterwards
+  double* x = origin_;  // 3 active numbers; the caller saves origin_ afterwards
   for (std::size_t a = 0; a < active_.size(); ++a) {
     const int i = active_[a];
     double moved[3] = {0, 0, 0};
@@ -79,13 +79,12 @@ bool ProxNewton::direction(double alpha) {
           for (int s = 0; s < 3; ++s) moved[r] += g[r * stride + s] * direction_[3 * j + s];
       });
     for (int r = 0; r < 3; ++r) {
-      const double* b = B_.data() + 9 * i + 3 * r;
+      const double* b = B_ + 9 * i + 3 * r;
       x[3 * a + r] = -F_[3 * i + r] - (b[0] * moved[0] + b[1] * moved[1] + b[2] * moved[2]);
     }
   }
   if (active_.empty()) return true;
-  if (!system_.factor(p_, active_, A_.data(), B_.data())) return false;
-  system_.solve(x.data());
+  if (!system_.solve_once(p_, active_, A_, B_, x)) return false;
   double sum = 0;
   for (std::size_t a = 0; a < active_.size(); ++a)
     for (int r = 0; r < 3; ++r) {
@@ -108,7 +107,7 @@ bool ProxNewton::subproblem(double alpha, double start_residual, double toleranc
     const double worst = *std::max_element(history, history + std::min(inner + 1, kMemory));
     ++steps_;
     if (!direction(alpha)) return false;
-    std::copy(p_.lambda, p_.lambda + 3 * p_.n, origin_.begin());
+    std::copy(p_.lambda, p_.lambda + 3 * p_.n, origin_);
     double t = 1;
     for (int halving = 0; halving < kMaxHalvings; ++halving, t *= 0.5) {
       for (int r = 0; r < 3 * p_.n; ++r) p_.lambda[r] = origin_[r] + t * direction_[r];
@@ -129,7 +128,7 @@ bool ProxNewton::run(BestImpulse& best, double alpha, int max_steps) {
   double residual = contact::largest_residual(p_, false);
   int failures = 0;
   while (!best.solved() && steps_ < last && alpha <= kLargestAlpha) {
-    std::copy(p_.lambda, p_.lambda + 3 * p_.n, center_.begin());
+    std::copy(p_.lambda, p_.lambda + 3 * p_.n, center_);
     const int before = steps_;
     const bool solved = subproblem(alpha, residual, best.tolerance(), last - steps_);
     if (best.offer(p_, SolveStage::kProxNewton)) return true;
@@ -140,7 +139,7 @@ bool ProxNewton::run(BestImpulse& best, double alpha, int max_steps) {
       failures = 0;
     } else {
       alpha *= failures == 0 ? 10 : 3;
-      std::copy(center_.begin(), center_.end(), p_.lambda);
+      std::copy(center_, center_ + 3 * p_.n, p_.lambda);
       contact::refresh_velocity(p_);
       if (++failures >= 4) {
         best.restore(p_);
@@ -153,13 +152,11 @@ bool ProxNewton::run(BestImpulse& best, double alpha, int max_steps) {
 }
 
 bool ProxNewton::step(double alpha) {
-  std::copy(p_.lambda, p_.lambda + 3 * p_.n, center_.begin());
-  std::copy(p_.v, p_.v + 3 * p_.n, u_.begin());
+  std::copy(p_.lambda, p_.lambda + 3 * p_.n, center_);
+  std::copy(p_.v, p_.v + 3 * p_.n, u_);
   ++steps_;
   if (!direction(alpha)) return false;
   for (int r = 0; r < 3 * p_.n; ++r) p_.lambda[r] = center_[r] + direction_[r];
-  project_on_cones(p_);
-  contact::refresh_velocity(p_);
   return true;
 }
 

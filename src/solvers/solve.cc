@@ -29,7 +29,7 @@ bool is_max_dissipation(FrictionLaw law) { return law == FrictionLaw::kMaxDissip
 /// What the residual may be at most [m/s].
 double allowed_residual(const ContactProblem& problem, const SolveOptions& o) {
   double fastest = 0;
-  for (double c : problem.free_velocity) fastest = std::fmax(fastest, std::fabs(c));
+  for (double c : problem.free_velocity) fastest = std::max(fastest, std::fabs(c));
   return o.tolerance + o.relative_tolerance * fastest;
 }
 

@@ -53,24 +53,38 @@ void check_pair(int row, int column, double a, double b, double allowed) {
   fail("ContactProblem.delassus[", row, ", ", column, "] is ", x, "; every entry must be finite");
 }
 
-/// Every entry finite, no negative diagonal, both triangles equal but for rounding.
+/// Every entry finite, no negative diagonal, both triangles equal but for rounding. Problems of robot size are
+/// checked in every solve, so the loops are plain sums and maxima; only a fault looks for its place.
 void check_dense(const std::vector<double>& G, int m) {
-  double sum = 0, largest = 0;
-  for (double x : G) sum += x - x, largest = std::fmax(largest, std::fabs(x));
-  if (!(sum == 0))
-    for (int i = 0; i < m * m; ++i)
-      if (!std::isfinite(G[i])) fail_not_finite(i / m, i % m, G[i]);
-  const double allowed = kAsymmetry * largest;
-  double apart = 0;
-  for (int i = 0; i < m; ++i) {
-    check_diagonal(i, G[std::size_t(i) * m + i]);
-    for (int j = 0; j < i; ++j)
-      apart = std::fmax(apart, std::fabs(G[std::size_t(i) * m + j] - G[std::size_t(j) * m + i]));
+  constexpr int kLanes = 4;
+  double sums[kLanes] = {}, most[kLanes] = {};
+  const std::size_t size = G.size(), whole = size / kLanes * kLanes;
+  const double* g = G.data();
+  for (std::size_t i = 0; i < whole; i += kLanes)
+    for (int k = 0; k < kLanes; ++k) {
+      sums[k] += g[i + k] - g[i + k];  // NaN from NaN and infinity
+      most[k] = max(most[k], abs(g[i + k]));
+    }
+  for (std::size_t i = whole; i < size; ++i) {
+    sums[0] += g[i] - g[i];
+    most[0] = max(most[0], abs(g[i]));
   }
-  if (apart <= allowed) return;
-  for (int i = 0; i < m; ++i)
+  if (!(sums[0] + sums[1] + sums[2] + sums[3] == 0))
+    for (std::size_t i = 0; i < size; ++i)
+      if (!std::isfinite(g[i])) fail_not_finite(int(i) / m, int(i) % m, g[i]);
+  const double allowed = kAsymmetry * max(max(most[0], most[1]), max(most[2], most[3]));
+  bool fine = true;
+  for (int i = 0; i < m; ++i) {
+    const double* row = g + std::size_t(i) * m;
+    fine = fine & (row[i] >= 0);
+    for (int j = 0; j < i; ++j) fine = fine & (abs(row[j] - g[std::size_t(j) * m + i]) <= allowed);
+  }
+  if (fine) return;
+  for (int i = 0; i < m; ++i) {
+    check_diagonal(i, g[std::size_t(i) * m + i]);
     for (int j = 0; j < i; ++j)
-      check_pair(i, j, G[std::size_t(i) * m + j], G[std::size_t(j) * m + i], allowed);
+      check_pair(i, j, g[std::size_t(i) * m + j], g[std::size_t(j) * m + i], allowed);
+  }
 }
 
 /// Indices first: everything after relies on them.
@@ -120,7 +134,7 @@ void check_block_sparse(const ContactProblem& p, int n) {
       for (int e = 0; e < 9; ++e) {
         const double x = p.delassus[9 * std::size_t(k) + e];
         if (!std::isfinite(x)) fail_not_finite(3 * i + e / 3, 3 * p.block_columns[k] + e % 3, x);
-        largest = std::fmax(largest, std::fabs(x));
+        largest = std::max(largest, std::fabs(x));
       }
   for (int i = 0; i < n; ++i)
     for (int k = p.block_starts[i]; k < p.block_starts[i + 1]; ++k) {
@@ -159,7 +173,7 @@ void check_semidefinite(const ContactProblem& p, int n) {
     const double* block = p.is_block_sparse() ? block_at(p, i, i) : nullptr;
     for (std::size_t r = 0; r < 3; ++r) {
       const std::size_t at = 3 * std::size_t(i) + r;
-      largest = std::fmax(largest, block ? block[4 * r] : p.delassus[at * 3 * n + at]);
+      largest = std::max(largest, block ? block[4 * r] : p.delassus[at * 3 * n + at]);
     }
   }
   // Shifted by a zero matrix's own size: a zero diagonal allows no other entry.
