@@ -21,6 +21,8 @@ from stickslip.contact import SOLVE_METHODS, ContactProblem
 #: With more problems than this the picture is a performance profile.
 MOST_PANELS = 6
 SOLVED, NOT_SOLVED, BAD_INPUT = 0, 1, 2
+#: The table does not become narrower [characters].
+NARROWEST = 116
 PICTURES = (".png", ".pdf", ".svg")
 
 
@@ -104,8 +106,9 @@ def _run(
 
 def _print(records: list[Record]) -> None:
     console = Console(highlight=False)
-    if not console.is_terminal:
-        console = Console(highlight=False, width=1000)  # no reader's window to fit: every row on one line
+    # Away from a terminal every row is one line; a narrow terminal wraps lines rather than lose digits.
+    width = max(console.width, NARROWEST) if console.is_terminal else 1000
+    console = Console(highlight=False, width=width)
     console.print(records_table(records))
     if len({r.problem for r in records}) > 1:
         console.print()

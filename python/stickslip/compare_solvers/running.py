@@ -141,14 +141,26 @@ def _solved(label: str, problem: ContactProblem, rank: int | None, options: dict
         backward_error=solution.certificate.backward_error,
         tolerance=options["tolerance"] + options["relative_tolerance"] * speed,
         status=solution.status,
-        history=solve(problem, **{**options, "history": True}).history if history else None,
+        history=_history(problem, options) if history else None,
     )
 
 
 def _timed(problem: ContactProblem, options: dict[str, Any]) -> tuple[float, ContactSolution]:
     times: list[float] = []
-    while len(times) < _REPEATS and sum(times) < _LONG_ENOUGH:
+    while _again(times):
         begin = perf_counter()
         solution = solve(problem, **options)
         times.append(perf_counter() - begin)
     return median(times), solution
+
+
+def _history(problem: ContactProblem, options: dict[str, Any]) -> History:
+    """Of the fastest of some solves, which differ in nothing but their times."""
+    recorded: list[History] = []
+    while _again([float(h.time[-1]) for h in recorded]):
+        recorded.append(solve(problem, **{**options, "history": True}).history)
+    return min(recorded, key=lambda h: h.time[-1])
+
+
+def _again(times: list[float]) -> bool:
+    return len(times) < _REPEATS and sum(times) < _LONG_ENOUGH

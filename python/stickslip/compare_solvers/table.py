@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import groupby
@@ -70,14 +71,16 @@ def records_table(records: Iterable[Record]) -> Table:
         table.add_column(name, justify="right", no_wrap=True)
     for name in ("method", "stage"):
         table.add_column(name, no_wrap=True)
-    for name in ("iterations", "time\n[ms]", "residual\n[m/s]", "residual\nover max|c|", "backward\nerror [m/s]"):
+    for name in ("iter-\nations", "time\n[ms]", "residual\n[m/s]", "over\nmax|c|", "backward\nerror [m/s]"):
         table.add_column(Text(name, justify="right"), justify="right", no_wrap=True)
     table.add_column("status", no_wrap=True)
 
+    records = list(records)
+    names = short_names(records)
     for name, group in groupby(records, key=lambda r: r.problem):
         of_problem = list(group)
         for k, r in enumerate(of_problem):
-            shared = (name, str(r.contacts), "-" if r.rank is None else str(r.rank)) if k == 0 else ("", "", "")
+            shared = (names[name], str(r.contacts), "-" if r.rank is None else str(r.rank)) if k == 0 else ("", "", "")
             table.add_row(
                 Text(shared[0]),  # Text: a name may hold what rich takes for markup
                 *shared[1:],
@@ -115,6 +118,13 @@ def write_csv(records: Iterable[Record], path: Path | str) -> Path:
     return Path(path)
 
 
+def short_names(records: Iterable[Record]) -> dict[str, str]:
+    """Names of problems without folders where that still tells them apart."""
+    names = list(dict.fromkeys(r.problem for r in records))
+    last = [os.path.basename(name) or name for name in names]
+    return dict(zip(names, last if len(set(last)) == len(last) else names, strict=True))
+
+
 def milliseconds(seconds: float) -> str:
     """Three digits, never with an exponent."""
     value = 1e3 * seconds
@@ -135,4 +145,4 @@ def _share(number: int, of: int) -> str:
 
 
 def _table() -> Table:
-    return Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1), header_style="bold")
+    return Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
