@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include "benchmarks/contact/measure.h"
-#include "contact/random_problems.h"
+#include "scenes/random.h"
 
 namespace stickslip::benchmarks {
 namespace {
@@ -17,7 +17,7 @@ constexpr double kAgreement = 1e-6;
 
 /// Coupled contacts with G between 1 and about 3 [1/kg]; small friction and coupling make the
 /// solution unique. Scales of 0.1 to 10 in mass and velocity show a missing time step or unit.
-ContactProblem well_conditioned(problems::Random& rng) {
+ContactProblem well_conditioned(scenes::Random& rng) {
   constexpr int m = 3 * kContacts;
   double a[m][m];
   for (auto& row : a)
@@ -53,7 +53,7 @@ void check_mix(const std::vector<ContactProblem>& problems,
 }  // namespace
 
 bool solvers_agree(const Methods& methods) {
-  problems::Random rng(1);
+  scenes::Random rng(1);
   std::vector<ContactProblem> problems;
   std::vector<std::vector<double>> truth;
   for (int k = 0; k < kProblems; ++k) {

@@ -31,6 +31,43 @@ double median(std::vector<double> x) {
   return *middle;
 }
 
+constexpr double kWarmUp = 2e-4;  // [s]
+
+/// What one method has been through.
+struct Runner {
+  Method* method;
+  std::vector<std::vector<double>> seconds;  // per problem, per counted round
+  std::vector<double> first, residual;       // per problem, of the round before those
+  double spent = 0;                          // [s]
+
+  Runner(Method& m, std::size_t count)
+      : method(&m), seconds(count), first(count), residual(count) {}
+
+  double solve(const ContactProblem& problem) {
+    method->prepare(problem, velocity_scale(problem));
+    const double time = timed_solve(*method);
+    spent += time;
+    return time;
+  }
+
+  /// Problems begin, ..., end - 1. Whoever solved before has filled the caches with its own code,
+  /// so the first solves do not count.
+  void take_turn(const ProblemSet& set, int round, std::size_t begin, std::size_t end) {
+    double warm = 0;
+    for (std::size_t k = begin; k < end && warm < kWarmUp; ++k) warm += solve(set.problems[k]);
+    for (std::size_t k = begin; k < end; ++k) {
+      const ContactProblem& problem = set.problems[k];
+      const double time = solve(problem);
+      if (round > 0) {
+        seconds[k].push_back(time);
+      } else {
+        first[k] = time;
+        residual[k] = worst_residual(problem, method->impulse()) / velocity_scale(problem);
+      }
+    }
+  }
+};
+
 }  // namespace
 
 double velocity_scale(const ContactProblem& problem) {
@@ -49,36 +86,23 @@ double worst_residual(const ContactProblem& problem, const std::vector<double>& 
 std::vector<Measurement> measure(const ProblemSet& set, const Methods& methods,
                                  const MeasureSettings& settings) {
   const std::size_t count = set.problems.size(), turn = static_cast<std::size_t>(settings.turn);
-  std::vector<Measurement> out(methods.size());
-  std::vector<std::vector<std::vector<double>>> seconds(methods.size());
-  std::vector<double> spent(methods.size(), 0);
-  for (std::size_t m = 0; m < methods.size(); ++m) {
-    seconds[m].resize(count);
-    out[m].residual.resize(count);
-  }
-  for (int round = 0; round <= settings.rounds; ++round)
+  std::vector<Runner> runners;
+  for (const auto& method : methods) runners.emplace_back(*method, count);
+  for (int round = 0; round <= settings.rounds; ++round) {
+    std::vector<Runner*> taking_part;  // whole rounds, so that each problem counts as often
+    for (Runner& r : runners)
+      if (round == 0 || r.spent < settings.patience) taking_part.push_back(&r);
     for (std::size_t begin = 0; begin < count; begin += turn)
-      for (std::size_t m = 0; m < methods.size(); ++m) {
-        if (round > 0 && spent[m] > settings.patience) continue;
-        for (std::size_t k = begin; k < std::min(begin + turn, count); ++k) {
-          const double scale = velocity_scale(set.problems[k]);
-          methods[m]->prepare(set.problems[k], scale);
-          const double time = timed_solve(*methods[m]);
-          if (round > 0) {
-            seconds[m][k].push_back(time);
-            continue;
-          }
-          spent[m] += time;
-          out[m].residual[k] = worst_residual(set.problems[k], methods[m]->impulse()) / scale;
-          seconds[m][k] = {time};
-        }
-      }
-  for (std::size_t m = 0; m < methods.size(); ++m) {
-    for (std::vector<double>& each : seconds[m]) {
-      if (each.size() > 1) each.erase(each.begin());  // the warm-up
-      out[m].microseconds.push_back(1e6 * median(each));
-    }
-    out[m].rounds = static_cast<int>(seconds[m][0].size());
+      for (Runner* r : taking_part) r->take_turn(set, round, begin, std::min(begin + turn, count));
+  }
+  std::vector<Measurement> out;
+  for (const Runner& r : runners) {
+    Measurement m;
+    m.residual = r.residual;
+    m.rounds = std::max(1, static_cast<int>(r.seconds[0].size()));
+    for (std::size_t k = 0; k < count; ++k)
+      m.microseconds.push_back(1e6 * (r.seconds[k].empty() ? r.first[k] : median(r.seconds[k])));
+    out.push_back(std::move(m));
   }
   return out;
 }

@@ -6,9 +6,9 @@
 namespace stickslip::benchmarks {
 
 struct MeasureSettings {
-  int rounds = 5;       ///< counted ones; one more warms up
-  int turn = 50;        ///< problems that a method solves before the next method's turn
-  double patience = 2;  ///< [s] a method that took longer for the set is not timed again
+  int rounds = 5;         ///< counted ones, after one that finds the residuals
+  int turn = 200;         ///< problems that a method solves before the next method's turn
+  double patience = 0.5;  ///< [s] a method that has taken longer for the set is not timed again
 };
 
 /// What one method did on one set.

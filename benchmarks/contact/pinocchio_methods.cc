@@ -107,8 +107,6 @@ Methods pinocchio_methods() {
   using Rule = pin::ADMMUpdateRule;
   Methods out;
   out.push_back(std::make_unique<Admm>(Rule::OSQP, 1e-6, 1000));  // its defaults
-  for (const double tolerance : {1e-9, 1e-10})
-    out.push_back(std::make_unique<Admm>(Rule::OSQP, tolerance, 1000));
   for (const Rule rule : {Rule::OSQP, Rule::SPECTRAL})
     for (const double tolerance : {1e-7, 1e-8, 1e-9, 1e-10, 1e-12})
       out.push_back(std::make_unique<Admm>(rule, tolerance, 5000));

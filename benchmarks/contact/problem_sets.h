@@ -1,4 +1,4 @@
-// The sets of problems, each with a fixed seed.
+// The sets of problems: families of scenes/problem_families.h, seeds 0, 1, 2, ...
 #pragma once
 #include <stickslip/contact.h>
 

@@ -66,16 +66,16 @@ class Siconos : public Method {
 
 Methods siconos_methods() {
   Methods out;
+  const auto add = [&](const char* name, int id, double tolerance, int iterations) {
+    out.push_back(std::make_unique<Siconos>(name, id, tolerance, iterations));
+  };
   for (const double tolerance : {1e-8, 1e-10}) {
-    out.push_back(
-        std::make_unique<Siconos>("siconos nsgs", SICONOS_FRICTION_3D_NSGS, tolerance, 1000));
-    out.push_back(
-        std::make_unique<Siconos>("siconos nsn_ac", SICONOS_FRICTION_3D_NSN_AC, tolerance, 200));
-    out.push_back(
-        std::make_unique<Siconos>("siconos admm", SICONOS_FRICTION_3D_ADMM, tolerance, 5000));
-    out.push_back(
-        std::make_unique<Siconos>("siconos prox", SICONOS_FRICTION_3D_PROX, tolerance, 1000));
+    add("siconos nsgs", SICONOS_FRICTION_3D_NSGS, tolerance, 1000);
+    add("siconos nsn_ac", SICONOS_FRICTION_3D_NSN_AC, tolerance, 200);
+    add("siconos admm", SICONOS_FRICTION_3D_ADMM, tolerance, 5000);
+    add("siconos prox", SICONOS_FRICTION_3D_PROX, tolerance, 1000);
   }
+  add("siconos prox", SICONOS_FRICTION_3D_PROX, 1e-12, 1000);
   return out;
 }
 
