@@ -13,7 +13,7 @@ namespace stickslip::benchmarks {
 namespace {
 
 constexpr int kProblems = 100, kContacts = 3;
-constexpr double kAgreement = 1e-6;
+constexpr double kAgreement = 1e-6, kNotFinite = 1e300;
 
 /// Coupled contacts with G between 1 and about 3 [1/kg]; small friction and coupling make the
 /// solution unique. Scales of 0.1 to 10 in mass and velocity show a missing time step or unit.
@@ -59,25 +59,25 @@ bool solvers_agree(const Methods& methods) {
   for (int k = 0; k < kProblems; ++k) {
     problems.push_back(well_conditioned(rng));
     SolveOptions options;
-    options.tolerance = 1e-12 * velocity_scale(problems.back());
+    options.tolerance = 0, options.relative_tolerance = 1e-12;
     truth.push_back(stickslip::solve(problems.back(), options).impulse);
   }
   check_mix(problems, truth);
 
   std::map<std::string, double> best;  // per solver: over its settings, the smallest of the worst
   for (const auto& method : methods) {
+    if (method->solver().rfind("stickslip", 0) == 0) continue;
     double worst = 0;
     for (int k = 0; k < kProblems; ++k) {
-      method->prepare(problems[k], velocity_scale(problems[k]));
+      method->prepare(problems[k]);
       method->solve();
       const std::vector<double> impulse = method->impulse();
-      double largest = 0, difference = 0;
+      // What would stop the largest free velocity: also where all contacts open, not zero.
+      const double unit = velocity_scale(problems[k]) / problems[k].delassus[0];
       for (std::size_t i = 0; i < impulse.size(); ++i) {
-        largest = std::max(largest, std::fabs(truth[k][i]));
-        difference = std::max(difference, std::fabs(impulse[i] - truth[k][i]));
+        const double difference = std::fabs(impulse[i] - truth[k][i]) / unit;
+        worst = std::isfinite(difference) ? std::max(worst, difference) : kNotFinite;
       }
-      if (!(difference <= 1e300)) difference = 1e300;
-      worst = std::max(worst, difference / largest);
     }
     const auto [entry, fresh] = best.emplace(method->solver(), worst);
     if (!fresh) entry->second = std::min(entry->second, worst);

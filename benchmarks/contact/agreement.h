@@ -5,9 +5,9 @@
 
 namespace stickslip::benchmarks {
 
-/// Well-conditioned problems whose contacts stick, slide and open; prints how far each solver's
-/// impulses are from ours, relative to the largest, in its most exact setting. False where that is
-/// above 1e-6.
+/// Well-conditioned problems whose contacts stick, slide and open; prints how far the impulses of
+/// each solver of others are from ours, relative to what stops max|c|, in its most exact setting.
+/// False where that is above 1e-6.
 bool solvers_agree(const Methods& methods);
 
 }  // namespace stickslip::benchmarks

@@ -15,14 +15,18 @@ double thread_seconds() {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-/// Seconds of one solve. The clock of the thread costs half a microsecond, so it counts only where
-/// the wall clock has run further: there, another process had the core meanwhile.
-double timed_solve(Method& method) {
-  const double thread = thread_seconds();
-  const auto start = std::chrono::steady_clock::now();
+double wall_seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+/// Seconds of one solve. A long one may lose the core to another process meanwhile; the clock of
+/// the thread shows it, but costs half a microsecond, and what it disturbs more.
+double timed_solve(Method& method, bool is_long) {
+  const double thread = is_long ? thread_seconds() : 0;
+  const double start = wall_seconds();
   method.solve();
-  const auto end = std::chrono::steady_clock::now();
-  return std::min(std::chrono::duration<double>(end - start).count(), thread_seconds() - thread);
+  const double wall = wall_seconds() - start;
+  return is_long ? std::min(wall, thread_seconds() - thread) : wall;
 }
 
 double median(std::vector<double> x) {
@@ -31,7 +35,7 @@ double median(std::vector<double> x) {
   return *middle;
 }
 
-constexpr double kWarmUp = 2e-4;  // [s]
+constexpr double kWarmUp = 2e-4, kLong = 5e-5;  // [s]
 
 /// What one method has been through.
 struct Runner {
@@ -39,15 +43,16 @@ struct Runner {
   std::vector<std::vector<double>> seconds;  // per problem, per counted round
   std::vector<double> first, residual;       // per problem, of the round before those
   double spent = 0;                          // [s]
+  double last = 0;                           // [s]
 
   Runner(Method& m, std::size_t count)
       : method(&m), seconds(count), first(count), residual(count) {}
 
   double solve(const ContactProblem& problem) {
-    method->prepare(problem, velocity_scale(problem));
-    const double time = timed_solve(*method);
-    spent += time;
-    return time;
+    method->prepare(problem);
+    last = timed_solve(*method, last > kLong);
+    spent += last;
+    return last;
   }
 
   /// Problems begin, ..., end - 1. Whoever solved before has filled the caches with its own code,
@@ -79,8 +84,10 @@ double velocity_scale(const ContactProblem& problem) {
 double worst_residual(const ContactProblem& problem, const std::vector<double>& impulse) {
   for (const double x : impulse)
     if (!std::isfinite(x)) return std::numeric_limits<double>::infinity();
-  const std::vector<double> each = residual(problem, impulse);
-  return *std::max_element(each.begin(), each.end());
+  double worst = 0;
+  for (const double e : residual(problem, impulse))
+    worst = std::isfinite(e) ? std::max(worst, e) : std::numeric_limits<double>::infinity();
+  return worst;
 }
 
 std::vector<Measurement> measure(const ProblemSet& set, const Methods& methods,

@@ -19,7 +19,7 @@ class Method {
 
   /// Takes a fresh copy of the problem, in the solver's own form and order. `scale` is max|c|
   /// [m/s].
-  virtual void prepare(const ContactProblem& problem, double scale) = 0;
+  virtual void prepare(const ContactProblem& problem) = 0;
   virtual void solve() = 0;
   /// The impulse found (3n) [N s], in our order: x, y, z (normal).
   virtual std::vector<double> impulse() const = 0;

@@ -20,7 +20,7 @@ namespace pin = pinocchio;
 class Pinocchio : public Method {
  public:
   using Method::Method;
-  void prepare(const ContactProblem& problem, double) override {
+  void prepare(const ContactProblem& problem) override {
     const int n = problem.num_contacts();
     using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
     // A new damping belongs to a new problem: ADMM leaves its last one in the operator.

@@ -22,7 +22,7 @@ Source family(const char* name, const char* group, int count) {
 }
 
 Source stacks(const char* name, double mass_ratio) {
-  return {name, "stacks", 200, [mass_ratio](std::uint64_t seed) {
+  return {name, "stacks", 100, [mass_ratio](std::uint64_t seed) {
             scenes::BoxStackOptions options;
             options.mass_ratio = mass_ratio;
             return scenes::box_stack(seed, options);
@@ -36,7 +36,7 @@ const std::vector<Source>& sources() {
       family("quadruped_impact", "4 feet", 1000),
       family("eight_contacts_resting", "8 contacts", 1000),
       family("eight_contacts_impact", "8 contacts", 1000),
-      family("duplicated_contacts", "duplicated", 300),
+      family("duplicated_contacts", "duplicated", 200),
       stacks("box_stack_1", 1),
       stacks("box_stack_1e2", 1e2),
       stacks("box_stack_1e4", 1e4),

@@ -1,6 +1,6 @@
 """Builds the comparison of contact solvers, runs it, and writes tables and a performance profile.
 
-Needs cmake, ninja, pin, cmeel-eigen, numpy and matplotlib in this interpreter's environment. Options that are not known here go
+Needs cmake, ninja, pin, numpy and matplotlib in this interpreter's environment. Options that are not known here go
 to the program, for instance `--sets quadruped --rounds 9`.
 """
 
@@ -60,9 +60,7 @@ def build(folder: Path, siconos: Path | None) -> Path:
         stdout=subprocess.DEVNULL,
     )
     if "stickslip_contact_compare" not in (folder / "build.ninja").read_text():
-        sys.exit(
-            f"Pinocchio or Eigen was not found. Install them with: {sys.executable} -m pip install pin==4.1.0 cmeel-eigen"
-        )
+        sys.exit(f"Pinocchio was not found. Install it with: {sys.executable} -m pip install pin==4.1.0")
     subprocess.run([tool("cmake"), "--build", folder, "--target", "stickslip_contact_compare"], check=True)
     return folder / "benchmarks" / "contact" / "stickslip_contact_compare"
 

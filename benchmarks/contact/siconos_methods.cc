@@ -27,7 +27,7 @@ class Siconos : public Method {
     options_->iparam[SICONOS_IPARAM_MAX_ITER] = iterations;
   }
   ~Siconos() override { solver_options_delete(options_); }
-  void prepare(const ContactProblem& problem, double) override {
+  void prepare(const ContactProblem& problem) override {
     const int m = 3 * problem.num_contacts();
     matrix_.resize(m * m), q_.resize(m), mu_ = problem.friction;
     for (int j = 0; j < m; ++j) {
@@ -73,9 +73,9 @@ Methods siconos_methods() {
     add("siconos nsgs", SICONOS_FRICTION_3D_NSGS, tolerance, 1000);
     add("siconos nsn_ac", SICONOS_FRICTION_3D_NSN_AC, tolerance, 200);
     add("siconos admm", SICONOS_FRICTION_3D_ADMM, tolerance, 5000);
-    add("siconos prox", SICONOS_FRICTION_3D_PROX, tolerance, 1000);
   }
-  add("siconos prox", SICONOS_FRICTION_3D_PROX, 1e-12, 1000);
+  for (const double tolerance : {1e-10, 1e-12})
+    add("siconos prox", SICONOS_FRICTION_3D_PROX, tolerance, 1000);
   return out;
 }
 

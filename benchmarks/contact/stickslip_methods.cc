@@ -10,13 +10,12 @@ namespace {
 class Stickslip : public Method {
  public:
   Stickslip(std::string solver, SolveMethod method, double relative)
-      : Method(std::move(solver), setting_name(relative)), relative_(relative) {
+      : Method(std::move(solver), setting_name(relative)) {
     options_.method = method;
+    options_.tolerance = 0;
+    options_.relative_tolerance = relative;
   }
-  void prepare(const ContactProblem& problem, double scale) override {
-    problem_ = problem;
-    options_.tolerance = relative_ * scale;
-  }
+  void prepare(const ContactProblem& problem) override { problem_ = problem; }
   void solve() override { result_ = stickslip::solve(problem_, options_); }
   std::vector<double> impulse() const override { return result_.impulse; }
 
@@ -26,7 +25,6 @@ class Stickslip : public Method {
     std::snprintf(text, sizeof text, "tol %.0e max|c|", relative);
     return text;
   }
-  double relative_;
   SolveOptions options_;
   ContactProblem problem_;
   SolveResult result_;
@@ -36,12 +34,17 @@ class Stickslip : public Method {
 
 Methods stickslip_methods() {
   Methods out;
+  const auto add = [&](const char* name, SolveMethod method, double relative) {
+    out.push_back(std::make_unique<Stickslip>(name, method, relative));
+  };
   for (const double relative : {1e-6, 1e-8}) {
-    out.push_back(std::make_unique<Stickslip>("stickslip auto", SolveMethod::kAuto, relative));
-    out.push_back(
-        std::make_unique<Stickslip>("stickslip per_contact", SolveMethod::kPerContact, relative));
-    out.push_back(std::make_unique<Stickslip>("stickslip pgs", SolveMethod::kPgs, relative));
+    add("stickslip auto", SolveMethod::kAuto, relative);
+    add("stickslip per_contact", SolveMethod::kPerContact, relative);
   }
+  add("stickslip pgs", SolveMethod::kPgs, 1e-8);
+  add("stickslip prox_newton", SolveMethod::kProxNewton, 1e-8);
+  add("stickslip interior_point", SolveMethod::kInteriorPoint, 1e-8);
+  add("stickslip admm", SolveMethod::kAdmm, 1e-8);
   return out;
 }
 
