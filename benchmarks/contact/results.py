@@ -197,27 +197,38 @@ def plot(sets: list[ProblemSet], path: Path, level: float = 1e-8) -> None:
     import matplotlib.pyplot as plt
 
     joined = groups(sets)
-    solvers = list(dict.fromkeys(s for problems in joined for s in problems.solvers()))
-    figure, axes = plt.subplots(1, len(joined), figsize=(4.2 * len(joined), 3.6), sharey=True, squeeze=False)
+    styles = line_styles(list(dict.fromkeys(s for problems in joined for s in problems.solvers())))
+    width = max(9.0, 4.2 * len(joined))
+    figure, axes = plt.subplots(1, len(joined), figsize=(width, 4), sharey=True, squeeze=False)
     for axis, problems in zip(axes[0], joined, strict=True):
-        for k, solver in enumerate(solvers):
+        for solver in problems.solvers():
             method = problems.chosen(solver, level)
             times = np.sort(method.microseconds[method.solved(level)])
             if len(times):
                 shares = 100 * np.arange(1, len(times) + 1) / len(problems)
-                axis.step(
-                    np.append(times, max(times[-1], 1e5)),
-                    np.append(shares, shares[-1]),
-                    where="post",
-                    color=plt.cm.tab10(k % 10),
-                    linewidth=2.4 if solver == OURS else 1.2,
-                    label=solver,
-                )
-        axis.set(xscale="log", xlim=(1, 1e5), ylim=(0, 102), title=problems.name, xlabel="time per problem [us]")
+                ends = [*times, max(times[-1], 1e6)]
+                axis.step(ends, [*shares, shares[-1]], where="post", **styles[solver])
+        axis.set(xscale="log", xlim=(0.3, 1e5), ylim=(0, 102), title=problems.name, xlabel="time per problem [us]")
         axis.grid(alpha=0.3)
     axes[0][0].set_ylabel(f"solved to {level:.0e} max|c| [%]")
-    handles = [plt.Line2D([], [], color=plt.cm.tab10(k % 10), label=s) for k, s in enumerate(solvers)]
-    figure.legend(handles=handles, loc="lower center", ncols=5, frameon=False)
-    figure.tight_layout(rect=(0, 0.14, 1, 1))
+    handles = [plt.Line2D([], [], label=solver, **style) for solver, style in styles.items()]
+    figure.legend(handles=handles, loc="lower center", ncols=4, frameon=False, fontsize=9)
+    figure.tight_layout(rect=(0, 0.2, 1, 1))
     figure.savefig(path, dpi=120)
     plt.close(figure)
+
+
+def line_styles(solvers: list[str]) -> dict[str, dict]:
+    """One line style per maker, one color per solver of a maker; ours is the thick one."""
+    strokes = {"stickslip": "-", "pinocchio": "--", "siconos": ":"}
+    seen = dict.fromkeys(strokes, 0)
+    styles = {}
+    for solver in solvers:
+        maker = solver.split()[0]
+        styles[solver] = {
+            "color": f"C{seen[maker]}",
+            "linestyle": strokes[maker],
+            "linewidth": 3 if solver == OURS else 1.5,
+        }
+        seen[maker] += 1
+    return styles
