@@ -11,7 +11,7 @@ LEVELS = (1e-6, 1e-8)  # residual over max|c| at which a problem counts as solve
 OURS = "stickslip auto"
 ADMM = "pinocchio admm"
 # Of a solver's settings within this share of its best solved share, the fastest one counts.
-NEARLY_BEST = 0.01
+NEARLY_BEST = 0.002
 
 
 @dataclass

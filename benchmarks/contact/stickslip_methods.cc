@@ -22,7 +22,7 @@ class Stickslip : public Method {
  private:
   static std::string setting_name(double relative) {
     char text[32];
-    std::snprintf(text, sizeof text, "tol %.0e max|c|", relative);
+    std::snprintf(text, sizeof text, "relative tol %.0e", relative);
     return text;
   }
   SolveOptions options_;
