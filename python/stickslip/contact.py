@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, get_args
+from os import PathLike
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -77,6 +78,19 @@ class ContactProblem:
         problem = cls(spatial, velocity, friction)
         problem._dimension = 2
         return problem
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> ContactProblem:
+        """The problem of an FCLIB file (HDF5), local or global; see `stickslip.fclib.load`."""
+        from stickslip import fclib
+
+        return fclib.load(path)
+
+    def save(self, path: str | PathLike[str], **options: Any) -> None:
+        """Writes the problem as an FCLIB file; options as those of `stickslip.fclib.save`."""
+        from stickslip import fclib
+
+        fclib.save(path, self, **options)
 
     @property
     def delassus(self) -> Array | sparse.bsr_array:
