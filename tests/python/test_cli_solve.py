@@ -204,6 +204,23 @@ def test_problems_without_anything_to_solve_can_be_drawn(tmp_path, capsys):
     assert (tmp_path / "a.png").stat().st_size > 10_000
 
 
+# What docs/solve.md says
+
+
+def test_the_page_runs_and_names_every_option(tmp_path, monkeypatch, capsys):
+    page = (Path(__file__).resolve().parents[2] / "docs" / "solve.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"```python\n(.*?)```", page, flags=re.S)
+    monkeypatch.chdir(tmp_path)
+    exec(compile(example, "docs/solve.md", "exec"), {})
+    assert capsys.readouterr().out.splitlines()[-2] == "auto 20 of 20"
+    assert {path.name for path in tmp_path.iterdir()} == {"stacks.csv", "profile.png", "curves.png"}
+    with pytest.raises(SystemExit):
+        cli.main(["solve", "--help"])
+    options = set(re.findall(r"--[a-z][a-z-]+", capsys.readouterr().out)) - {"--help"}
+    assert options == set(re.findall(r"--[a-z][a-z-]+", page))
+    assert all(f"`{method}`" in page for method in SOLVE_METHODS)
+
+
 # Bad input
 
 

@@ -54,7 +54,7 @@ def draw_profile(records: Sequence[Record], path: Path) -> Path:
     axis.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
     axis.xaxis.set_minor_locator(NullLocator())
     axis.yaxis.set_major_formatter(PercentFormatter(1.0, symbol=" %"))
-    axis.set_xlabel("time over that of the fastest method on the same problem, at most")
+    axis.set_xlabel("allowed time, relative to the fastest method on the problem")
     axis.set_ylabel("share of problems solved")
     number = len({r.problem for r in records})
     figures.title(axis, f"{number} problems: solved within a factor of the fastest")
