@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import csv
+import io
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -153,6 +157,37 @@ def test_file_names_that_are_no_text_are_printed_all_the_same(tmp_path, capsys):
     (tmp_path / "a.hdf5").rename(tmp_path / "\udcff\n.hdf5")
     assert solve(tmp_path, "--csv", tmp_path / "a.csv") == 0
     assert "\\xff\\n.hdf5" in capsys.readouterr().out
+
+
+def test_file_names_are_printed_where_only_ascii_can_be(tmp_path, monkeypatch):
+    fclib.save(tmp_path / "Kiste-ä.hdf5", QUADRUPED)
+    bytes_out = io.BytesIO()
+    monkeypatch.setattr("sys.stdout", io.TextIOWrapper(bytes_out, encoding="ascii", write_through=True))
+    assert solve(tmp_path) == 0
+    assert b"Kiste-\\xe4.hdf5" in bytes_out.getvalue()
+
+
+def test_a_narrow_terminal_folds_names_and_keeps_every_digit(folder, monkeypatch, capsys):
+    solve(folder / "stack.hdf5")
+    wide = capsys.readouterr().out
+    for name, value in (("FORCE_COLOR", "1"), ("NO_COLOR", "1"), ("COLUMNS", "60"), ("TERM", "dumb")):
+        monkeypatch.setenv(name, value)
+    (folder / "stack.hdf5").rename(folder / f"{'stack' * 20}.hdf5")
+    solve(folder / f"{'stack' * 20}.hdf5")
+    narrow = capsys.readouterr().out
+    assert "…" not in narrow and max(map(len, narrow.splitlines())) < 130
+    residual = rows(wide)[0][7]
+    assert residual in narrow and "converged" in narrow
+
+
+def test_a_reader_that_stops_reading_is_no_error(folder, tmp_path):
+    read, write = os.pipe()
+    os.close(read)
+    arguments = [sys.executable, "-m", "stickslip.cli", "solve", folder, "--csv", tmp_path / "a.csv"]
+    result = subprocess.run(arguments, stdout=write, stderr=subprocess.PIPE, text=True)
+    os.close(write)
+    assert (result.returncode, result.stderr) == (0, "")
+    assert len((tmp_path / "a.csv").read_text().splitlines()) == 3
 
 
 # What it writes

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import itertools
+import os
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -108,11 +109,18 @@ def _print(records: list[Record]) -> None:
     console = Console(highlight=False)
     # Away from a terminal every row is one line; a narrow terminal wraps lines rather than lose digits.
     width = max(console.width, NARROWEST) if console.is_terminal else 1000
-    console = Console(highlight=False, width=width)
-    console.print(records_table(records))
-    if len({r.problem for r in records}) > 1:
-        console.print()
-        console.print(summary_table(summary(records)))
+    console = Console(highlight=False, width=width, height=25)  # without a height, dumb terminals get 80 columns
+    with console.capture() as captured:
+        console.print(records_table(records))
+        if len({r.problem for r in records}) > 1:
+            console.print()
+            console.print(summary_table(summary(records)))
+    text = "\n".join(line.rstrip() for line in captured.get().splitlines())
+    encoding = console.encoding  # which may have no letters for the name of a file
+    try:
+        print(text.encode(encoding, "backslashreplace").decode(encoding), flush=True)
+    except BrokenPipeError:  # the reader, such as head, has seen enough; what is left of the text goes nowhere
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _write(records: list[Record], arguments: argparse.Namespace, curves: bool) -> None:

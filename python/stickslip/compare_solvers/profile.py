@@ -1,7 +1,7 @@
 """Performance profiles: many problems, several methods, one picture.
 
 The profile of a method is the share of problems that it solves within a factor tau of the time of the fastest method on that
-problem [Dolan and More, "Benchmarking optimization software with performance profiles", 2002]. At tau = 1 it says how often the
+problem (Dolan and Moré, "Benchmarking optimization software with performance profiles", 2002). At tau = 1 it says how often the
 method is the fastest, at the right end how often it solves at all.
 """
 
