@@ -114,7 +114,7 @@ struct SolveOptions {
   bool minimum_norm = false;
   /// kProxNewton: proximal weight of the first subproblem, relative to G_ii; > 0.
   double proximal_weight = 1e-3;
-  ShiftRule shift = ShiftRule::kLagged;  ///< kInteriorPoint
+  ShiftRule shift = ShiftRule::kExact;  ///< kInteriorPoint
   /// kPerContact only. kGoldenSection minimizes an energy, so it knows kMaxDissipation only.
   SingleContactMethod single_contact = SingleContactMethod::kHalley;
   double single_contact_tolerance =

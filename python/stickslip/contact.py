@@ -220,7 +220,7 @@ def solve(
     max_iterations: int | None = None,
     minimum_norm: bool = False,
     proximal_weight: float = 1e-3,
-    shift: Literal["lagged", "damped", "exact"] = "lagged",
+    shift: Literal["exact", "lagged", "damped"] = "exact",
 ) -> ContactSolution:
     """Solves a contact problem. Never raises for a hard problem: look at `converged`, `status` and `certificate`.
 
@@ -235,8 +235,8 @@ def solve(
     minimum_norm: of the impulses with the same velocity, return the one with the least tangential part. Redundant contacts
         leave a choice; without this it depends on the order of the contacts.
     proximal_weight: of the first subproblem of "prox_newton", relative to G_ii.
-    shift: how the steps of "interior_point" treat De Saxce's shift mu |v_T|: from the last iterate, half way towards it, or
-        linearized.
+    shift: how the steps of "interior_point" treat De Saxce's shift mu |v_T|: linearized ("exact"), from the last iterate, or
+        half way towards it. Alone it ends near 1e-7 where contacts slide: "auto" goes on from there with Newton steps.
     single_contact: method of "per_contact" for one contact; "golden_section" knows "max_dissipation" only.
     alpha, alpha_min, gamma: relaxation of "per_contact", alpha <- alpha_min + gamma (alpha - alpha_min) per sweep (the paper:
         1, 0.7, 0.99); for "pgs" alpha is the constant factor of eq. 18. Default: 1, and 0.6 for "pgs".

@@ -48,6 +48,14 @@ STICKSLIP_INLINE void for_each_block(const ExplicitProblem& p, int i, F&& f) {
   }
 }
 
+/// Two contacts that do not couple.
+inline bool is_zero_block(const double* g, int stride) {
+  for (int r = 0; r < 3; ++r)
+    for (int s = 0; s < 3; ++s)
+      if (g[long(r) * stride + s] != 0) return false;
+  return true;
+}
+
 /// One term more of a sum in twice the precision: (sum, rest) += a b. Fused and error-free
 /// transformations, so that a velocity which is the small difference of large terms keeps its
 /// digits.

@@ -44,26 +44,23 @@ bool Admm::factor(double rho) {
 
 /// Of G / unit, by a few power steps from a fixed start: a tenth is precise enough for rho.
 double Admm::largest_eigenvalue() {
-  const std::vector<double> kept(p_.lambda, p_.lambda + 3 * p_.n);
-  double length = 0;
-  for (int r = 0; r < 3 * p_.n; ++r) p_.lambda[r] = 1 + 0.1 * (r % 7);
-  for (int k = 0; k < 12; ++k) {
-    double before = 0;
-    for (int r = 0; r < 3 * p_.n; ++r) before += p_.lambda[r] * p_.lambda[r];
+  const int m = 3 * p_.n;
+  const std::vector<double> kept(p_.lambda, p_.lambda + m);
+  for (int r = 0; r < m; ++r) x_[r] = 1 + 0.1 * (r % 7);
+  double length = std::sqrt(double(m)), growth = 0;
+  for (int k = 0; k < 12 && length > 0; ++k) {
+    // Impulses in their own unit, so that the unit of mass does not show in the rounding.
+    for (int r = 0; r < m; ++r) p_.lambda[r] = x_[r] / (length * unit_);
     contact::refresh_velocity(p_);
-    length = 0;
-    for (int r = 0; r < 3 * p_.n; ++r) {
-      const double g = (p_.v[r] - p_.c[r]) / unit_;
-      length += g * g;
-      p_.lambda[r] = g;
+    double square = 0;
+    for (int r = 0; r < m; ++r) {
+      x_[r] = p_.v[r] - p_.c[r];
+      square += x_[r] * x_[r];
     }
-    if (!(length > 0)) break;
-    const double f = 1 / std::sqrt(length);
-    length = std::sqrt(length / before);
-    for (int r = 0; r < 3 * p_.n; ++r) p_.lambda[r] *= f;
+    growth = length = std::sqrt(square);
   }
   std::copy(kept.begin(), kept.end(), p_.lambda);
-  return std::max(length, 1e-3);
+  return std::max(growth, 1e-3);
 }
 
 bool Admm::run(BestImpulse& best, int max_iterations) {

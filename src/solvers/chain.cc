@@ -4,9 +4,10 @@
 #include <cmath>
 
 #include "contact/per_contact.h"
-#include "solvers/interior_point.h"
-#include "solvers/prox_newton.h"
 #include "solvers/admm.h"
+#include "solvers/interior_point.h"
+#include "solvers/islands.h"
+#include "solvers/prox_newton.h"
 
 namespace stickslip::solvers {
 namespace {
@@ -49,8 +50,9 @@ class Chain {
   void run() {
     if (p_.n <= kRobotSized ? sweeps_with_newton() : patient_sweeps()) return;
     // What is left is hyperstatic, ill-conditioned or large.
+    if (separate_islands()) return;
     if (proximal_newton(best_.impulse(), 1e-3, 60)) return;
-    for (const ShiftRule shift : {ShiftRule::kLagged, ShiftRule::kExact, ShiftRule::kDamped})
+    for (const ShiftRule shift : {ShiftRule::kExact, ShiftRule::kLagged, ShiftRule::kDamped})
       if (interior_point(shift)) return;
     if (admm(2000)) return;
     for (const double alpha : {1e-1, 1e-5, 1e-2}) {
@@ -64,6 +66,30 @@ class Chain {
   }
 
  private:
+  /// Contacts that do not couple, even through others, are solved apart: a hard island no longer holds up easy
+  /// ones. True if there was more than one island; then each has had its turn.
+  bool separate_islands() {
+    const Islands islands(p_);
+    if (islands.count() < 2) return false;
+    best_.restore(p_);
+    for (int k = 0; k < islands.count(); ++k) {
+      const std::vector<int> contacts = islands.contacts(k);
+      if (is_solved(contacts)) continue;
+      const Island island(p_, contacts);
+      BestImpulse best(best_.tolerance(), false, nullptr);
+      Chain(island.view(), best, max_sweeps_, effort_).run();
+      for (std::size_t a = 0; a < contacts.size(); ++a)
+        std::copy_n(best.impulse().begin() + 3 * a, 3, p_.lambda + 3 * contacts[a]);
+      best_.offer(p_, best.stage());
+    }
+    return true;
+  }
+  bool is_solved(const std::vector<int>& contacts) const {
+    for (const int i : contacts)
+      if (!(contact_residual(p_, i, false) <= best_.tolerance())) return false;
+    return true;
+  }
+
   /// The largest velocity change of a sweep [m/s].
   double sweep() {
     const double speed = 0.01 * best_.tolerance();

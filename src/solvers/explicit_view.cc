@@ -8,13 +8,6 @@ namespace {
 constexpr int kSparseFrom = 60;       // contacts; below, dense rows are faster than indices
 constexpr double kDenseShare = 0.5;   // of the blocks
 
-bool is_zero_block(const double* g, int stride) {
-  for (int r = 0; r < 3; ++r)
-    for (int s = 0; s < 3; ++s)
-      if (g[long(r) * stride + s] != 0) return false;
-  return true;
-}
-
 }  // namespace
 
 ExplicitView::ExplicitView(const ContactProblem& problem, const std::vector<double>& impulse) {
@@ -46,7 +39,7 @@ void ExplicitView::drop_zero_blocks(const ContactProblem& problem) {
   starts_.assign(1, 0);
   for (int i = 0; i < n; ++i) {
     for (int j = 0; j < n; ++j)
-      if (i == j || !is_zero_block(block(i, j), m)) columns_.push_back(j);
+      if (i == j || !contact::is_zero_block(block(i, j), m)) columns_.push_back(j);
     starts_.push_back(int(columns_.size()));
   }
   if (double(columns_.size()) > kDenseShare * n * n) return;

@@ -6,11 +6,16 @@
 namespace stickslip::solvers {
 namespace {
 
+constexpr double kSmallestFriction = 1e-9;  // a cone without friction has no interior
+constexpr int kPatience = 45;               // iterations without a better impulse
+constexpr double kInside = 1e-17;           // of x_z squared: the least distance to the boundary
+
 // The cone {x_z >= |x_T|} as a Jordan algebra; z is the scalar part.
 double tangential(const double x[3]) { return std::sqrt(x[0] * x[0] + x[1] * x[1]); }
+/// Not negative: iterates may lie as near to the boundary as rounding lets them.
 double determinant(const double x[3]) {
   const double t = tangential(x);
-  return (x[2] - t) * (x[2] + t);
+  return std::max((x[2] - t) * (x[2] + t), kInside * x[2] * x[2]);
 }
 void product(const double x[3], const double y[3], double out[3]) {
   out[0] = x[2] * y[0] + y[2] * x[0];
@@ -64,9 +69,6 @@ void inverse_square(const Scaling& s, double out[9]) {
     for (int c = 0; c < 3; ++c)
       out[3 * r + c] = f * (2 * v[r] * v[c] + (r != c ? 0 : r == 2 ? -1 : 1));
 }
-
-constexpr double kSmallestFriction = 1e-9;  // a cone without friction has no interior
-constexpr int kPatience = 45;               // iterations without a better impulse
 
 }  // namespace
 

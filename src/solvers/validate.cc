@@ -35,6 +35,23 @@ void check_length(const char* name, std::size_t length, std::size_t expected, co
        " for n = ", n, " contacts (as many as friction has)");
 }
 
+const char* method_name(SolveMethod method) {
+  switch (method) {
+    case SolveMethod::kPgs:
+      return "pgs";
+    case SolveMethod::kProxNewton:
+      return "prox_newton";
+    case SolveMethod::kInteriorPoint:
+      return "interior_point";
+    case SolveMethod::kAdmm:
+      return "admm";
+    case SolveMethod::kPerContact:
+      return "per_contact";
+    default:
+      return "auto";
+  }
+}
+
 void check_diagonal(int row, double x) {
   if (x < 0)
     fail("ContactProblem.delassus[", row, ", ", row, "] is ", x,
@@ -221,8 +238,8 @@ void check_settings(const char* where, const SolverSettings& s) {
     fail(where, ".gamma is ", s.gamma, "; it must lie in [0, 1]");
   if (s.method != SolveMethod::kAuto && s.method != SolveMethod::kPerContact &&
       s.law != FrictionLaw::kCoulomb)
-    fail(where,
-         ".method solves law coulomb only (eq. 6); use per_contact or auto for max_dissipation");
+    fail(where, ": ", method_name(s.method),
+         " solves law coulomb only (eq. 6); use per_contact or auto for max_dissipation");
   if (s.method == SolveMethod::kPerContact)
     check_single(s.single_contact, s.law, (std::string(where) + ".single_contact").c_str());
 }

@@ -111,16 +111,18 @@ def test_a_warm_start_saves_sweeps():
     p = random_problem(4, 1)
     a = ss.solve(p, method="per_contact")
     b = ss.solve(p, method="per_contact", impulse=a.impulse)
-    assert b.sweeps == 1 < a.sweeps
+    assert b.sweeps == 0 < a.sweeps and b.stage == "start"
 
 
 def test_history_has_one_entry_per_sweep():
     p = random_problem(4, 2)
     s = ss.solve(p, method="per_contact", history=True)
-    assert len(s.history) == s.sweeps and s.history[-1] <= 1e-9
+    assert len(s.history) == s.sweeps + 1  # and the start
+    assert s.history.stage == ["start"] + ["sweeps"] * s.sweeps
+    assert s.history.residual[-1] <= 1e-9 and (np.diff(s.history.time) >= 0).all()
     assert len(ss.solve(p).history) == 0
     s = ss.solve(p, method="pgs", stop="update_sum", tolerance=1e-6, history=True)
-    assert s.history[-1] <= 1e-6
+    assert len(s.history) == s.sweeps + 1
 
 
 def test_the_papers_settings_run():
@@ -159,7 +161,12 @@ def test_bad_problems_raise_with_the_place():
 def test_bad_options_raise():
     p = ss.ContactProblem(BLOCK, C, [0.5])
     for options, text in [
-        ({"method": "newton"}, "method is 'newton'; choose one of 'auto', 'per_contact', 'pgs'"),
+        ({"method": "newton"}, "method is 'newton'; choose one of 'auto', 'per_contact', 'pgs', 'prox_newton'"),
+        ({"method": "admm", "law": "max_dissipation"}, "admm solves law coulomb only"),
+        ({"shift": "soft"}, "shift is 'soft'; choose one of 'lagged', 'damped', 'exact'"),
+        ({"max_iterations": 0}, "max_iterations is 0; it must be at least 1, or None"),
+        ({"proximal_weight": 0}, "proximal_weight is 0"),
+        ({"relative_tolerance": -1}, "relative_tolerance is -1"),
         ({"law": "dry"}, "law is 'dry'"),
         ({"tolerance": 0}, "tolerance is 0"),
         ({"tolerance": np.nan}, "tolerance is nan"),

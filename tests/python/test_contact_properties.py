@@ -194,7 +194,6 @@ def test_asking_for_more_does_not_give_less():
         assert max(relative[1:]) <= relative[0] + 1e-6 * np.abs(p.free_velocity).max()
 
 
-@pytest.mark.xfail(strict=True, reason="a cold start is not among what the chain compares")
 def test_a_problem_without_a_solution_gets_nothing_worse_than_no_impulse():
     """A rail that jams: the contact moves along one line only, and friction holds it there while it is driven in."""
     line = np.array([1.45, 0.54, 0.33])

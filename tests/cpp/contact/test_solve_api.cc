@@ -64,7 +64,7 @@ TEST(BadOptionsAndImpulsesAreNamed) {
   o = {}, o.alpha = kNan;
   CHECK_THROWS(solve(p, o), ModelError, "alpha");
   o = {}, o.method = SolveMethod::kPgs, o.law = FrictionLaw::kMaxDissipation;
-  CHECK_THROWS(solve(p, o), ModelError, "solves law coulomb only");
+  CHECK_THROWS(solve(p, o), ModelError, "pgs solves law coulomb only");
   o = {}, o.method = SolveMethod::kPerContact,
   o.single_contact = SingleContactMethod::kGoldenSection;
   CHECK_THROWS(solve(p, o), ModelError, "golden_section minimizes the energy");
