@@ -23,13 +23,13 @@ enum class SingleContactMethod {
   kQuartic,        ///< closed form of the quartic; fails now and then, and says so
 };
 
-/// Method for several contacts (docs/theory/contact.md, sections 4, 5 and 7).
+/// Method for several contacts (docs/theory/solvers.md, sections 1 to 7).
 enum class SolveMethod {
   kAuto,           ///< the chain: sweeps, Newton steps, interior point, ADMM; the default
   kPerContact,     ///< [Hwangbo 2018] Algorithm 2
   kPgs,            ///< projected Gauss-Seidel, [Hwangbo 2018] eq. 17, 18
   kProxNewton,     ///< proximal point method with semismooth Newton steps, [Alart 1991]
-  kInteriorPoint,  ///< primal-dual interior point on the friction cones, [Acary 2023]
+  kInteriorPoint,  ///< primal-dual interior point on the friction cones, [Acary 2024]
   kAdmm,           ///< alternating directions with De Saxce's shift, [Carpentier 2024]
 };
 
@@ -110,7 +110,7 @@ struct SolveOptions {
   int max_iterations = 0;  ///< Newton, interior-point or ADMM steps of a method chosen by name, >= 0;
                            ///< 0: 500, 100 or 5000
   /// Among impulses with the same velocity, the one with the least tangential part (redundant
-  /// contacts leave a choice: feet that press against each other). kCoulomb only.
+  /// contacts leave a choice: feet that press against each other), (C70). kCoulomb only.
   bool minimum_norm = false;
   /// kProxNewton: proximal weight of the first subproblem, relative to G_ii; > 0.
   double proximal_weight = 1e-3;
@@ -129,7 +129,7 @@ struct SolveOptions {
   void validate() const;        ///< throws ModelError that names the option
 };
 
-/// How good an impulse is, from the problem and the impulse alone (docs/theory/contact.md, section 8).
+/// How good an impulse is, from the problem and the impulse alone (docs/theory/solvers.md, section 8).
 /// Velocities are v = G impulse + c.
 struct Certificate {
   std::vector<double> residuals;        ///< (n) residual of each contact [m/s], see `residual`

@@ -1,7 +1,7 @@
 // Bisection on the angle of a sliding impulse: [Hwangbo 2018] Algorithm 1 with its printed faults
 // corrected.
 //
-// Where we differ from the printed algorithm, and why (docs/theory/contact.md, section 6):
+// Where we differ from the printed algorithm, and why (docs/theory/contact.md, section 4):
 //  - line 13: "out of sight" is grad h2 . (lambda - lambda_0) > 0; with the printed "<" the
 //  stepping never ends;
 //  - lines 13-14: a rejected step restores lambda together with theta, or line 33 compares with a

@@ -1,5 +1,5 @@
 // A contact problem v = G lambda + c, G dense or block sparse, whose velocities are kept up to date
-// while impulses change.
+// while impulses change (docs/theory/solvers.md, sections 1 and 3).
 //
 // Owns no memory: the caller hands in the arrays and a workspace, so a step can solve without
 // allocating. The stopping tests of the sweeps are here too; all are functions of (G, c, mu,
@@ -66,7 +66,7 @@ STICKSLIP_INLINE void add_product(double a, double b, double& sum, double& rest)
   sum = next;
 }
 
-/// v = G lambda + c from scratch, rounded once: with mass ratios of 1e6 a plain sum would drown
+/// v = G lambda + c from scratch, rounded once (C27): with mass ratios of 1e6 a plain sum would drown
 /// 1e-8 of c in the rounding of the impulses.
 inline void refresh_velocity(ExplicitProblem& p) {
   const int m = 3 * p.n;

@@ -1,5 +1,5 @@
 // The default solver of a step, `auto`: warm-started sweeps, Newton finish on the shared dofs,
-// fallback, certificate (docs/theory/contact.md (C20)-(C38)). Never fails to return: the best
+// fallback, certificate (docs/theory/solvers.md (C20)-(C38)). Never fails to return: the best
 // impulse found, its residual, and whether it is good enough.
 //
 // Rule between sweeps and Newton steps, per lane: with e_k the largest velocity change of sweep k,

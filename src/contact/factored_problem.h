@@ -1,5 +1,5 @@
 // Contacts that couple only through a few shared dofs, and the memory of their solve
-// (docs/theory/contact.md (C20)-(C24)).
+// (docs/theory/solvers.md (C20)-(C24)).
 //
 //   v_i = c0_i + Y_i w + P_i lambda_i,   w = w0 + sum_j Y_j^T lambda_j,   G_ii = Y_i Y_i^T + P_i
 // Used terms: w shared vector (m); Y_i rows of contact i on the shared dofs it touches; P_i its

@@ -1,5 +1,5 @@
 // Where sweeps and Newton steps stall (hyperstatic contact): proximal point method with damped
-// semismooth Newton steps, in double, one problem at a time (docs/theory/contact.md (C35)-(C38)).
+// semismooth Newton steps, in double, one problem at a time (docs/theory/solvers.md (C35)-(C38)).
 //
 // Outer loop: lambda_(k+1) solves the problem with u + alpha scale (lambda - lambda_k) in place of
 // u; alpha shrinks after each solved subproblem, also where the residual has not halved (a

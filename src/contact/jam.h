@@ -1,6 +1,6 @@
 // Contacts that jam: friction that presses a contact harder into the ground than it slows it (mu
 // |w| > 1, Painleve) may leave a problem without a finite solution (docs/theory/contact.md, section
-// 6). What the methods leave there can be huge, or sink into the ground. The least bad answer is
+// 4). What the methods leave there can be huge, or sink into the ground. The least bad answer is
 // bounded and does not sink: such contacts are solved without friction, the others as they are.
 #pragma once
 #include "contact/fallback.h"

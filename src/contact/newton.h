@@ -1,5 +1,5 @@
 // Newton finish of a factored problem: one semismooth Newton step on the Alart-Curnier map with a
-// proximal term, eliminated to the m shared dofs (docs/theory/contact.md (C30)-(C34)).
+// proximal term, eliminated to the m shared dofs (docs/theory/solvers.md (C30)-(C34)).
 //
 // Per contact, in velocity units (scale = trace G_ii / 3), u its velocity, t = scale lambda_T -
 // u_T, s = scale lambda_z - u_z:

@@ -3,7 +3,7 @@
 //
 //   lambda_i <- alpha lambda_i* + (1 - alpha) lambda_i,   lambda_i* solves contact i with the
 //   others held alpha <- alpha_min + gamma (alpha - alpha_min)        after each sweep
-// Where we differ from the printed algorithm (docs/theory/contact.md, section 6): c_i is rebuilt
+// Where we differ from the printed algorithm (docs/theory/contact.md, section 4): c_i is rebuilt
 // from the newest impulses at each visit; sticking needs lambda_z >= 0 besides the cone; mu = 0
 // slides with lambda_T = 0. The default is alpha = gamma = 1: relaxation costs sweeps and leaves
 // complementarity asymptotic.

@@ -1,6 +1,6 @@
 // Block Gauss-Seidel over a factored problem: one visit solves one contact with the others held
 // ([Hwangbo 2018] Algorithm 2 with alpha = 1), in the space of the shared dofs
-// (docs/theory/contact.md (C20)-(C24)).
+// (docs/theory/solvers.md (C20)-(C24)).
 //
 //   c = c0 + Y w - (Y Y^T) lambda;   lambda' = local(c);   w += Y^T (lambda' - lambda)
 // A visit costs 45 multiplications however many contacts there are; the slip solve takes one Halley

@@ -14,7 +14,7 @@ constexpr double kStart = 16;     // rho = 16 sqrt(L eta) at first, L the larges
 constexpr double kGrowth = 2;     // of rho, or shrinking, where the residuals are out of balance
 constexpr int kOfferEvery = 5;
 
-/// Euclidean projection on the cone |x_T| <= mu x_z.
+/// Euclidean projection on the cone |x_T| <= mu x_z, of (C51).
 void project_on_cone(double mu, double* x) {
   const double t = std::sqrt(x[0] * x[0] + x[1] * x[1]);
   if (t <= mu * x[2]) return;
@@ -33,6 +33,7 @@ Admm::Admm(contact::ExplicitProblem& p)
   if (trace > 0) unit_ = trace / (3 * p.n);
 }
 
+/// The matrix of (C50).
 bool Admm::factor(double rho) {
   for (int i = 0; i < p_.n; ++i)
     for (int r = 0; r < 3; ++r) {
@@ -63,6 +64,7 @@ double Admm::largest_eigenvalue() {
   return std::max(growth, 1e-3);
 }
 
+/// (C50) and (C51) in one pass over the contacts, then the rule for rho, (C52).
 bool Admm::run(BestImpulse& best, int max_iterations) {
   const int m = 3 * p_.n;
   if (m == 0) return best.solved();

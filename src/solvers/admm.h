@@ -1,4 +1,4 @@
-// Alternating direction method of multipliers with De Saxce's shift (docs/theory/contact.md (C50)-(C52)),
+// Alternating direction method of multipliers with De Saxce's shift (docs/theory/solvers.md (C50)-(C52)),
 // [Carpentier 2024]:
 //
 //   x <- argmin 1/2 x^T G x + (c + shift) x + eta/2 |x - x_old|^2 + rho/2 |x - y - z/rho|^2,

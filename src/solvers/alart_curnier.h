@@ -1,5 +1,5 @@
 // Map of Alart and Curnier for one contact, in velocity units, and an element of its generalized
-// derivative (docs/theory/contact.md (C30), (C31)): zero exactly at a solution under Coulomb's law.
+// derivative (docs/theory/solvers.md (C30), (C31)): zero exactly at a solution under Coulomb's law.
 //
 //   s = scale lambda_z - u_z,  t = scale lambda_T - u_T,  e = t / |t|,  limit = mu max(0, s)
 //   F_z = u_z if s > 0, else scale lambda_z

@@ -1,5 +1,6 @@
 // The best impulse of a solve so far, and the record of how it came about. Methods may end on a worse
-// point than they have seen; the caller never gets that.
+// point than they have seen; the caller never gets that (docs/theory/solvers.md, section 7). Velocities
+// by (C27), residuals by (C3) or (C25).
 #pragma once
 #include <stickslip/contact.h>
 

@@ -8,7 +8,7 @@ namespace stickslip::solvers {
 BlockSystem::BlockSystem() = default;
 BlockSystem::~BlockSystem() = default;
 
-/// Rows are `stride` apart. Three rows at a time, over runs of contacts that follow each other in G.
+/// The matrix of (C28), rows `stride` apart. Three rows at a time, over runs of contacts that follow each other in G.
 void BlockSystem::assemble_dense(const contact::ExplicitProblem& p, const std::vector<int>& active,
                                  const double* A, const double* B, int stride) {
   const int n = int(active.size());

@@ -1,5 +1,5 @@
 // The linear systems of all methods: (A + B G) x = f with block-diagonal A and B, over the contacts that
-// take part. Newton steps, interior-point steps and ADMM differ in A and B only.
+// take part. Newton steps, interior-point steps and ADMM differ in A and B only (docs/theory/solvers.md (C28)).
 #pragma once
 #include <memory>
 #include <vector>

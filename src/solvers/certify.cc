@@ -13,7 +13,7 @@ constexpr double kSlides = 1e-6;    // of the largest |c|: below, a contact has 
 
 double length2(const double x[3]) { return std::sqrt(x[0] * x[0] + x[1] * x[1]); }
 
-/// The least |d| for which v + d and the impulse obey Signorini's condition and Coulomb's law: at rest
+/// (C60) by (C61): the least |d| for which v + d and the impulse obey Signorini's condition and Coulomb's law: at rest
 /// any v + d that opens; inside the cone v + d = 0; on its mantle v + d = -s e, s >= 0. What an impulse
 /// has outside its cone counts as a velocity too.
 double backward_error(const LocalContact<double>& k, const double v[3], const double l[3]) {
@@ -29,8 +29,7 @@ double backward_error(const LocalContact<double>& k, const double v[3], const do
   return std::sqrt(x * x + y * y + v[2] * v[2]) + outside;
 }
 
-/// Angle between lambda_T and -v_T [rad]: by the chord of the two unit vectors, exact enough where it is
-/// small and monotone everywhere. Own arithmetic: 2 asin(chord / 2).
+/// Angle between lambda_T and -v_T [rad], of (C64); atan2 keeps small angles exact.
 double direction_angle(const double v[3], const double l[3]) {
   const double speed = length2(v), t = length2(l);
   const double cross = l[0] * v[1] - l[1] * v[0], dot = -(l[0] * v[0] + l[1] * v[1]);
@@ -39,6 +38,7 @@ double direction_angle(const double v[3], const double l[3]) {
 
 }  // namespace
 
+/// The largest of (C3) or (C25), (C61) and (C64) over the contacts.
 Certificate certify(const contact::ExplicitProblem& p, bool max_dissipation) {
   Certificate out;
   out.residuals.resize(p.n);

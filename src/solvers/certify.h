@@ -1,4 +1,4 @@
-// The certificate of an impulse (docs/theory/contact.md (C60)-(C63)); a pure function.
+// The certificate of an impulse (docs/theory/solvers.md (C60)-(C64)); a pure function.
 #pragma once
 #include <stickslip/contact.h>
 

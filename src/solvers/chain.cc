@@ -17,7 +17,7 @@ using contact::ExplicitProblem;
 /// Contacts up to which a Newton step costs about as much as a few sweeps.
 constexpr int kRobotSized = BlockSystem::kDenseRows / 3;
 
-/// One visit of contact i: its exact impulse with the others held, a sliding one by a single Halley step
+/// One visit of contact i, (C4) to (C9): its exact impulse with the others held, a sliding one by a single Halley step
 /// from its last direction, since the sweep will come back. Returns the squared velocity change.
 double visit(ExplicitProblem& p, int i, double speed, double direction[2]) {
   const contact::LocalContact<double>& k = p.local[i];

@@ -1,4 +1,4 @@
-// The chain behind method "auto" (docs/theory/contact.md, section 7): cheap methods first, each stage starting
+// The chain behind method "auto" (docs/theory/solvers.md, section 7): cheap methods first, each stage starting
 // where the best impulse so far lies, until one meets the tolerance.
 #pragma once
 #include "solvers/best_impulse.h"

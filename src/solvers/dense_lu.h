@@ -1,5 +1,6 @@
 // Dense systems of robot size (up to some hundred rows), row-major, with partial pivoting, in place, without
-// allocation: LU factors for several right-hand sides, and one elimination for a single one.
+// allocation: LU factors for several right-hand sides, and one elimination for a single one (docs/theory/solvers.md
+// (C28)).
 #pragma once
 #include "lane/pack.h"
 

@@ -1,4 +1,4 @@
-// An explicit problem with its memory, from the public type.
+// An explicit problem (docs/theory/solvers.md, section 3) with its memory, from the public type.
 #pragma once
 #include <stickslip/contact.h>
 

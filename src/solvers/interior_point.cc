@@ -42,7 +42,7 @@ double to_boundary(const double x[3], const double d[3]) {
   return t;
 }
 
-/// Scaling point of Nesterov and Todd: S = eta V(w) with S y = S^-1 x.
+/// Scaling point of Nesterov and Todd (C43): S = eta V(w) with S y = S^-1 x.
 struct Scaling {
   double w[3], eta;
 };
@@ -82,6 +82,7 @@ InteriorPoint::InteriorPoint(contact::ExplicitProblem& p) : p_(p), A_(9 * p.n), 
   D_.resize(2 * active_.size());
 }
 
+/// D of (C40) and the first x and y.
 void InteriorPoint::start() {
   double fastest = 0;
   for (std::size_t a = 0; a < active_.size(); ++a) {
@@ -98,7 +99,7 @@ void InteriorPoint::start() {
     for (int r = 0; r < 3; ++r) x_[3 * a + r] = y_[3 * a + r] = r == 2 ? fastest : 0;
 }
 
-/// lambda = D x, v from it, and what y lacks: F = D v + shift - y.
+/// lambda = D x, v from it, and what y lacks of (C41): F = D v + shift - y.
 void InteriorPoint::evaluate(ShiftRule shift, bool first) {
   std::fill(p_.lambda, p_.lambda + 3 * p_.n, 0.0);
   for (std::size_t a = 0; a < active_.size(); ++a)
@@ -114,7 +115,7 @@ void InteriorPoint::evaluate(ShiftRule shift, bool first) {
   }
 }
 
-/// (D G D + C S^-2) in the unknown dlambda = D dx, with C = 1 - z t^T where the shift is exact.
+/// (D G D + C S^-2) of (C45) in the unknown dlambda = D dx, with C = 1 - z t^T where the shift is exact.
 bool InteriorPoint::factor(ShiftRule shift) {
   for (std::size_t a = 0; a < active_.size(); ++a) {
     const double *x = x_.data() + 3 * a, *y = y_.data() + 3 * a;
@@ -136,7 +137,7 @@ bool InteriorPoint::factor(ShiftRule shift) {
   return system_.factor(p_, active_, A_.data(), B_.data());
 }
 
-/// dx, dy with S^-1 dx + S dy = lambda \ complementarity and the linearized F = 0.
+/// (C44) by (C45): dx, dy with S^-1 dx + S dy = lambda \ complementarity and the linearized F = 0.
 void InteriorPoint::step_direction(const std::vector<double>& complementarity) {
   // right_ becomes S^-1 k, dx_ the right-hand side C S^-1 k - F.
   for (std::size_t a = 0; a < active_.size(); ++a) {
@@ -186,7 +187,7 @@ bool InteriorPoint::run(BestImpulse& best, ShiftRule shift, int max_iterations) 
     }
     ++iterations_;
     if (!factor(shift)) break;
-    // Predictor: straight to the boundary.
+    // Predictor (C46): straight to the boundary.
     double gap = 0;
     for (std::size_t a = 0; a < active_.size(); ++a) {
       const double* l = lambda_.data() + 3 * a;

@@ -1,5 +1,5 @@
-// Primal-dual interior-point method on the second-order cones of friction (docs/theory/contact.md (C40)-
-// (C46)), [Acary 2023]. Solves what sweeps and Newton steps from an active set lose: large mass ratios,
+// Primal-dual interior-point method on the second-order cones of friction (docs/theory/solvers.md (C40)-
+// (C46)), [Acary 2024]. Solves what sweeps and Newton steps from an active set lose: large mass ratios,
 // many coupled contacts.
 //
 // Scaled per contact, x = E^-1 D^-1 lambda and y = D E (v + mu |v_T| z) lie in the same self-dual cone

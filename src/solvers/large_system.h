@@ -1,5 +1,6 @@
 // Block systems beyond robot size, by Eigen: sparse LU where G is block sparse, blocked dense LU where it
-// is full. Apart, because only this and the check for definiteness see Eigen.
+// is full. Apart, because only this and the check for definiteness see Eigen (docs/theory/solvers.md
+// (C28)).
 #pragma once
 #include <memory>
 #include <vector>

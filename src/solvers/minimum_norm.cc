@@ -33,7 +33,7 @@ Eigen::MatrixXd tangential_block(const contact::ExplicitProblem& p, const std::v
 
 }  // namespace
 
-// The answer is the projection of zero on {x : G x = G x0} and the friction discs, by Dykstra's alternating
+// (C70). The answer is the projection of zero on {x : G x = G x0} and the friction discs, by Dykstra's alternating
 // projections. G is semidefinite, so what its tangential block does not see no other row sees either.
 void minimize_tangential_impulses(contact::ExplicitProblem& p, double speed) {
   std::vector<int> stick;

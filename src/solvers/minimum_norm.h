@@ -1,5 +1,5 @@
 // Redundant contacts leave a choice of impulses with the same velocity; this takes the one with the least
-// tangential part (docs/theory/contact.md (C70)). Feet that press against each other through the ground, as
+// tangential part (docs/theory/solvers.md (C70)). Feet that press against each other through the ground, as
 // sweeps may leave them, do so no longer.
 #pragma once
 #include "contact/explicit_problem.h"

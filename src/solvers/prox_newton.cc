@@ -25,7 +25,7 @@ ProxNewton::ProxNewton(contact::ExplicitProblem& p)
   active_.reserve(p.n);
 }
 
-/// u = v + alpha scale (lambda - center).
+/// u = v + alpha scale (lambda - center), (C35).
 void ProxNewton::shift_velocity(double alpha) {
   for (int i = 0; i < p_.n; ++i) {
     const double weight = alpha * p_.local[i].scale;
@@ -34,6 +34,7 @@ void ProxNewton::shift_velocity(double alpha) {
   }
 }
 
+/// (C36).
 double ProxNewton::merit() {
   double sum = 0;
   for (int i = 0; i < p_.n; ++i) {
@@ -44,7 +45,7 @@ double ProxNewton::merit() {
   return std::sqrt(sum);
 }
 
-/// Newton direction at (lambda, u). Contacts that are not active go to zero; their part moves to the
+/// Newton direction (C39) at (lambda, u). Contacts that are not active go to zero; their part moves to the
 /// right-hand side.
 bool ProxNewton::direction(double alpha) {
   active_.clear();
@@ -94,7 +95,7 @@ bool ProxNewton::direction(double alpha) {
   return std::isfinite(sum);
 }
 
-/// Newton on one subproblem, from p.lambda (p.v up to date). True if solved.
+/// Newton with backtracking (C37) on one subproblem, from p.lambda (p.v up to date). True if solved.
 bool ProxNewton::subproblem(double alpha, double start_residual, double tolerance, int max_steps) {
   double history[kMemory];
   shift_velocity(alpha);
@@ -121,6 +122,7 @@ bool ProxNewton::subproblem(double alpha, double start_residual, double toleranc
   return false;
 }
 
+/// The weights of (C38).
 bool ProxNewton::run(BestImpulse& best, double alpha, int max_steps) {
   const int last = steps_ + max_steps;
   project_on_cones(p_);

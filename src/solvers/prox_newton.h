@@ -1,5 +1,5 @@
 // Proximal point method with damped semismooth Newton steps on the map of Alart and Curnier, on an
-// explicit problem (docs/theory/contact.md (C35)-(C38)). Coulomb's law.
+// explicit problem (docs/theory/solvers.md, section 4, (C35)-(C39)). Coulomb's law.
 //
 // lambda^(k+1) solves the problem with v + alpha scale (lambda - lambda^k) in place of v: regular
 // however redundant the contacts are. alpha shrinks after each solved subproblem, also where the

@@ -1,4 +1,5 @@
-// The public contact API on top of the methods: memory, choice of method, certificate.
+// The public contact API on top of the methods: memory, choice of method, certificate
+// (docs/theory/solvers.md, sections 7 to 9).
 #include <stickslip/contact.h>
 #include <stickslip/errors.h>
 
