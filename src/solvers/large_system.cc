@@ -9,7 +9,7 @@ namespace {
 
 using Sparse = Eigen::SparseMatrix<double>;
 
-/// B_i G_ij + (A_i where i = j), from the block G_ji (G is symmetric).
+/// Block of (C28): B_i G_ij + (A_i where i = j), from the block G_ji (G is symmetric).
 Eigen::Matrix3d system_block(const double* A, const double* B, int i, int j, const double* g,
                              int stride) {
   using Rows = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;

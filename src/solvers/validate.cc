@@ -1,4 +1,4 @@
-// Checks of the public problem types. Every text names the argument, where it is wrong, and what it
+// Checks of the public problem types, (C1). Every text names the argument, where it is wrong, and what it
 // must be.
 #include "solvers/validate.h"
 
