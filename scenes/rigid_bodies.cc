@@ -103,8 +103,9 @@ ContactProblem RigidBodies::problem(double friction, Storage storage) const {
             for (int k = 0; k < 6; ++k) block[3 * r + s] += a.y[r][k] * b.y[s][k];
       }
   std::vector<double> mu(contacts_.size(), friction);
-  return storage == Storage::kDense ? delassus.dense_problem(std::move(free_velocity), std::move(mu))
-                                    : delassus.sparse_problem(std::move(free_velocity), std::move(mu));
+  return storage == Storage::kDense
+             ? delassus.dense_problem(std::move(free_velocity), std::move(mu))
+             : delassus.sparse_problem(std::move(free_velocity), std::move(mu));
 }
 
 }  // namespace stickslip::scenes

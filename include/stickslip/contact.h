@@ -33,8 +33,8 @@ enum class SolveMethod {
   kAdmm,           ///< alternating directions with De Saxce's shift, [Carpentier 2024]
 };
 
-/// How interior-point steps treat De Saxce's shift mu |v_T|, what makes Coulomb's law more than a convex
-/// problem.
+/// How interior-point steps treat De Saxce's shift mu |v_T|, what makes Coulomb's law more than a
+/// convex problem.
 enum class ShiftRule {
   kLagged,  ///< from the last iterate: every step is one of a convex problem
   kDamped,  ///< half way from the last one: where lagging oscillates (large friction)
@@ -54,19 +54,24 @@ enum class SolveStage {
 /// How a solve ended. Whatever the status, the impulse returned is the best one found, inside its
 /// cones, and the certificate says how good it is.
 enum class SolveStatus {
-  /// Cause: the residual is at most the tolerance. Consequence: the impulse is the exact answer to a
+  /// Cause: the residual is at most the tolerance. Consequence: the impulse is the exact answer to
+  /// a
   /// problem whose contact velocities differ by the certificate's backward error. Remedy: none
   /// needed.
   kConverged,
-  /// Cause: a method chosen by name used up max_sweeps or max_iterations. Consequence: the laws hold
+  /// Cause: a method chosen by name used up max_sweeps or max_iterations. Consequence: the laws
+  /// hold
   /// up to the residual only. Remedy: raise the limit, or use kAuto.
   kIterationLimit,
   /// Cause: every stage ended above the tolerance: it lies below the rounding of the problem, or
-  /// friction jams (Painleve) and no finite impulse exists, or the problem is harder than the methods.
-  /// Consequence: as above. Remedy: compare the residual with 1e-16 times the largest G_ii |lambda_i|;
+  /// friction jams (Painleve) and no finite impulse exists, or the problem is harder than the
+  /// methods.
+  /// Consequence: as above. Remedy: compare the residual with 1e-16 times the largest G_ii
+  /// |lambda_i|;
   /// check friction and geometry; in a simulation halve the step.
   kStalled,
-  /// Cause: a contact cannot push (G_zz near 0: its body is held along the normal) and is driven in.
+  /// Cause: a contact cannot push (G_zz near 0: its body is held along the normal) and is driven
+  /// in.
   /// Consequence: no impulse keeps it from sinking; all other contacts are solved as far as the
   /// residuals say. Remedy: drop the contact, or let its body move.
   kInfeasible,
@@ -81,14 +86,15 @@ enum class StopTest {
                ///< kPgs
 };
 
-/// A contact problem, dense or block sparse. Dense: `delassus` is row-major (3n, 3n). Block sparse (where
-/// `block_starts` is not empty): `delassus` holds k blocks, each row-major (3, 3), both triangles, in
-/// the layout of SciPy's BSR with sorted columns; blocks that are not stored are zero.
+/// A contact problem, dense or block sparse. Dense: `delassus` is row-major (3n, 3n). Block sparse
+/// (where `block_starts` is not empty): `delassus` holds k blocks, each row-major (3, 3), both
+/// triangles, in the layout of SciPy's BSR with sorted columns; blocks that are not stored are
+/// zero.
 struct ContactProblem {
   std::vector<double> delassus;       ///< (3n, 3n) or (k, 3, 3), symmetric semidefinite [1/kg]
   std::vector<double> free_velocity;  ///< (3n) [m/s]
   std::vector<double> friction;  ///< (n) [1], not negative; infinite and huge values count as 1e4
-  std::vector<int> block_starts{};   ///< (n + 1): blocks of row i are starts[i] .. starts[i + 1] - 1
+  std::vector<int> block_starts{};  ///< (n + 1): blocks of row i are starts[i] .. starts[i + 1] - 1
   std::vector<int> block_columns{};  ///< (k): column of each block, ascending within a row
   /// n, as many as `friction` has.
   int num_contacts() const { return static_cast<int>(friction.size()); }
@@ -104,11 +110,12 @@ struct SolveOptions {
   FrictionLaw law = FrictionLaw::kCoulomb;  ///< kPgs knows kCoulomb only
   /// On the largest contact residual [m/s], or on the sum that `stop` names; not negative.
   double tolerance = 1e-9;
-  /// Added to it: this much of the largest |free velocity|; not negative. One of the two is positive.
+  /// Added to it: this much of the largest |free velocity|; not negative. One of the two is
+  /// positive.
   double relative_tolerance = 0;
   int max_sweeps = 1000;   ///< >= 1; kAuto: of each of its sweep stages
-  int max_iterations = 0;  ///< Newton, interior-point or ADMM steps of a method chosen by name, >= 0;
-                           ///< 0: 500, 100 or 5000
+  int max_iterations = 0;  ///< Newton, interior-point or ADMM steps of a method chosen by name, >=
+                           ///< 0; 0: 500, 100 or 5000
   /// Among impulses with the same velocity, the one with the least tangential part (redundant
   /// contacts leave a choice: feet that press against each other), (C70). kCoulomb only.
   bool minimum_norm = false;
@@ -129,18 +136,19 @@ struct SolveOptions {
   void validate() const;        ///< throws ModelError that names the option
 };
 
-/// How good an impulse is, from the problem and the impulse alone (docs/theory/solvers.md, section 8).
-/// Velocities are v = G impulse + c.
+/// How good an impulse is, from the problem and the impulse alone (docs/theory/solvers.md, section
+/// 8). Velocities are v = G impulse + c.
 struct Certificate {
   std::vector<double> residuals;        ///< (n) residual of each contact [m/s], see `residual`
-  std::vector<double> backward_errors;  ///< (n) the least change of the contact's velocity that makes
-                                        ///< its impulse exact under Coulomb's law [m/s]
-  double residual = 0;                  ///< the largest [m/s]
-  double backward_error = 0;            ///< the largest [m/s]
-  double penetration_speed = 0;         ///< the largest -v_z, or 0 [m/s]
-  double cone_violation = 0;            ///< the largest |lambda_T| - mu lambda_z, or 0 [N s]
+  std::vector<double> backward_errors;  ///< (n) the least change of the contact's velocity that
+                                        ///< makes its impulse exact under Coulomb's law [m/s]
+  double residual = 0;           ///< the largest [m/s]
+  double backward_error = 0;     ///< the largest [m/s]
+  double penetration_speed = 0;  ///< the largest -v_z, or 0 [m/s]
+  double cone_violation = 0;     ///< the largest |lambda_T| - mu lambda_z, or 0 [N s]
   /// The largest angle between the friction of a sliding contact and the direction against its
-  /// sliding [rad]; contacts slower than 1e-6 of the largest |c|, or that hardly push, do not count.
+  /// sliding [rad]; contacts slower than 1e-6 of the largest |c|, or that hardly push, do not
+  /// count.
   double direction_error = 0;
   double power = 0;  ///< the largest |lambda . (v + mu |v_T| z)|, zero at a solution [J]
 };
@@ -177,7 +185,8 @@ SolveResult solve(const ContactProblem& problem, const SolveOptions& options = {
 std::vector<double> residual(const ContactProblem& problem, const std::vector<double>& impulse,
                              FrictionLaw law = FrictionLaw::kCoulomb);
 
-/// Certificate of any impulse (3n); a pure function of its arguments. Throws ModelError for bad input.
+/// Certificate of any impulse (3n); a pure function of its arguments. Throws ModelError for bad
+/// input.
 Certificate certify(const ContactProblem& problem, const std::vector<double>& impulse,
                     FrictionLaw law = FrictionLaw::kCoulomb);
 

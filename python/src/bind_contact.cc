@@ -124,7 +124,8 @@ class CheckedProblem {
     return dict_of(r);
   }
   nb::dict certify(const VectorIn& impulse, const std::string& law) const {
-    return dict_of(stickslip::certify(problem_, vector_of(impulse), choice("law", law, kFrictionLaws)));
+    return dict_of(
+        stickslip::certify(problem_, vector_of(impulse), choice("law", law, kFrictionLaws)));
   }
 
  private:

@@ -46,8 +46,8 @@ std::optional<E> choice(const char* argument, const std::optional<std::string>& 
   return choice(argument, *text, words);
 }
 
-/// (delassus (3n, 3n) or (k, 3, 3), free velocity (3n,), friction (n,), block starts (n + 1), block columns
-/// (k)); the last two empty where it is dense.
+/// (delassus (3n, 3n) or (k, 3, 3), free velocity (3n,), friction (n,), block starts (n + 1), block
+/// columns (k)); the last two empty where it is dense.
 nb::tuple arrays_of(const ContactProblem& p) {
   const std::size_t rows = p.free_velocity.size();
   const auto copy = [&](std::span<double> to) {

@@ -20,8 +20,8 @@ struct ExplicitProblem {
   LocalContact<double>* local = nullptr;  // (n)
   double* v = nullptr;                    // (3n) G lambda + c [m/s]
   double* rounding = nullptr;             // (3n) scratch of `refresh_velocity`
-  // Block sparse G, null where it is dense: row i of blocks is starts[i] .. starts[i + 1] - 1, block
-  // k belongs to column columns[k] (ascending, both triangles, every diagonal block).
+  // Block sparse G, null where it is dense: row i of blocks is starts[i] .. starts[i + 1] - 1,
+  // block k belongs to column columns[k] (ascending, both triangles, every diagonal block).
   const int* starts = nullptr;   // (n + 1)
   const int* columns = nullptr;  // (k)
 
@@ -37,7 +37,8 @@ struct ExplicitProblem {
   const double* row(int r) const { return G + static_cast<long>(r) * 3 * n; }
 };
 
-/// Calls f(j, block, stride) for the blocks of row i: entry (r, s) of G_ij is block[r * stride + s].
+/// Calls f(j, block, stride) for the blocks of row i: entry (r, s) of G_ij is block[r * stride +
+/// s].
 template <class F>
 STICKSLIP_INLINE void for_each_block(const ExplicitProblem& p, int i, F&& f) {
   if (p.starts) {
@@ -66,11 +67,11 @@ STICKSLIP_INLINE void add_product(double a, double b, double& sum, double& rest)
   sum = next;
 }
 
-/// v = G lambda + c from scratch, rounded once (C27): with mass ratios of 1e6 a plain sum would drown
-/// 1e-8 of c in the rounding of the impulses.
+/// v = G lambda + c from scratch, rounded once (C27): with mass ratios of 1e6 a plain sum would
+/// drown 1e-8 of c in the rounding of the impulses.
 inline void refresh_velocity(ExplicitProblem& p) {
   const int m = 3 * p.n;
-  double *__restrict__ v = p.v, *__restrict__ rest = p.rounding;
+  double* __restrict__ v = p.v, * __restrict__ rest = p.rounding;
   for (int r = 0; r < m; ++r) v[r] = p.c[r], rest[r] = 0;
   if (p.starts) {
     for (int i = 0; i < p.n; ++i)

@@ -7,26 +7,25 @@
 namespace stickslip::solvers {
 namespace {
 
-constexpr double kEta = 1e-6;     // proximal weight
-constexpr double kTau = 0.5;      // share of rho that enters
-constexpr double kRatio = 10;     // primal to dual residual at which rho changes
-constexpr double kStart = 16;     // rho = 16 sqrt(L eta) at first, L the largest eigenvalue
-constexpr double kGrowth = 2;     // of rho, or shrinking, where the residuals are out of balance
+constexpr double kEta = 1e-6;  // proximal weight
+constexpr double kTau = 0.5;   // share of rho that enters
+constexpr double kRatio = 10;  // primal to dual residual at which rho changes
+constexpr double kStart = 16;  // rho = 16 sqrt(L eta) at first, L the largest eigenvalue
+constexpr double kGrowth = 2;  // of rho, or shrinking, where the residuals are out of balance
 constexpr int kOfferEvery = 5;
-
-/// Euclidean projection on the cone |x_T| <= mu x_z, of (C51).
-void project_on_cone(double mu, double* x) {
-  const double t = std::sqrt(x[0] * x[0] + x[1] * x[1]);
-  if (t <= mu * x[2]) return;
-  const double z = (mu * t + x[2]) / (1 + mu * mu);
-  const double f = z > 0 ? mu * z / t : 0;
-  x[0] *= f, x[1] *= f, x[2] = std::max(z, 0.0);
-}
 
 }  // namespace
 
 Admm::Admm(contact::ExplicitProblem& p)
-    : p_(p), all_(p.n), A_(9 * p.n), B_(9 * p.n), x_(3 * p.n), y_(3 * p.n), z_(3 * p.n), before_(3 * p.n) {
+    : p_(p),
+      system_(p.n, std::pmr::get_default_resource()),
+      all_(p.n),
+      A_(9 * p.n),
+      B_(9 * p.n),
+      x_(3 * p.n),
+      y_(3 * p.n),
+      z_(3 * p.n),
+      before_(3 * p.n) {
   std::iota(all_.begin(), all_.end(), 0);
   double trace = 0;
   for (int i = 0; i < p.n; ++i) trace += 3 * p.local[i].scale;
@@ -77,11 +76,13 @@ bool Admm::run(BestImpulse& best, int max_iterations) {
   for (int k = 0; k < max_iterations; ++k) {
     ++iterations_;
     const double weight = kTau * rho;
-    std::vector<double>& right = before_;
+    Doubles& right = before_;
     for (int i = 0; i < p_.n; ++i) {
-      const double shift = p_.local[i].mu * std::sqrt(z_[3 * i] * z_[3 * i] + z_[3 * i + 1] * z_[3 * i + 1]);
+      const double shift =
+          p_.local[i].mu * std::sqrt(z_[3 * i] * z_[3 * i] + z_[3 * i + 1] * z_[3 * i + 1]);
       for (int r = 3 * i; r < 3 * i + 3; ++r)
-        right[r] = kEta * x_[r] + weight * y_[r] + z_[r] - p_.c[r] / unit_ - (r % 3 == 2 ? shift : 0);
+        right[r] =
+            kEta * x_[r] + weight * y_[r] + z_[r] - p_.c[r] / unit_ - (r % 3 == 2 ? shift : 0);
     }
     system_.solve(right.data());
     double primal = 0, dual = 0;

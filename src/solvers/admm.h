@@ -1,13 +1,11 @@
-// Alternating direction method of multipliers with De Saxce's shift (docs/theory/solvers.md (C50)-(C52)),
-// [Carpentier 2024]:
+// Alternating direction method of multipliers with De Saxce's shift (docs/theory/solvers.md
+// (C50)-(C52)), [Carpentier 2024]:
 //
 //   x <- argmin 1/2 x^T G x + (c + shift) x + eta/2 |x - x_old|^2 + rho/2 |x - y - z/rho|^2,
 //   y <- P_K(x - z / rho),   z <- z - rho (x - y),   shift_i = mu |z_T|;   z tends to v + shift
-// with a spectral rule for rho. Coulomb's law. A method of the field to compare with, and a start for
-// Newton steps where nothing else has helped.
+// with a spectral rule for rho. Coulomb's law. A method of the field to compare with, and a start
+// for Newton steps where nothing else has helped.
 #pragma once
-#include <vector>
-
 #include "solvers/best_impulse.h"
 #include "solvers/block_system.h"
 
@@ -27,8 +25,8 @@ class Admm {
 
   contact::ExplicitProblem& p_;
   BlockSystem system_;
-  std::vector<int> all_;
-  std::vector<double> A_, B_, x_, y_, z_, before_;
+  Integers all_;
+  Doubles A_, B_, x_, y_, z_, before_;
   double unit_ = 1;  // mean of the diagonal of G [1/kg]: the method runs on G / unit
   int iterations_ = 0;
 };

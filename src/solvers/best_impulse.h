@@ -1,6 +1,6 @@
-// The best impulse of a solve so far, and the record of how it came about. Methods may end on a worse
-// point than they have seen; the caller never gets that (docs/theory/solvers.md, section 7). Velocities
-// by (C27), residuals by (C3) or (C25).
+// The best impulse of a solve so far, and the record of how it came about. Methods may end on a
+// worse point than they have seen; the caller never gets that (docs/theory/solvers.md, section 7).
+// Velocities by (C27), residuals by (C3) or (C25).
 #pragma once
 #include <stickslip/contact.h>
 
@@ -8,48 +8,44 @@
 #include <vector>
 
 #include "contact/explicit_problem.h"
+#include "solvers/cones.h"
+#include "solvers/memory.h"
 
 namespace stickslip::solvers {
-
-/// Brings every impulse into its cone: normal part kept if not negative, tangential part shortened.
-inline void project_on_cones(contact::ExplicitProblem& p) {
-  for (int i = 0; i < p.n; ++i) {
-    double* l = p.lambda + 3 * i;
-    l[2] = max(l[2], 0.0);
-    const double square = l[0] * l[0] + l[1] * l[1], limit = p.local[i].mu * l[2];
-    if (square > limit * limit) {
-      const double f = limit / sqrt(square);
-      l[0] *= f, l[1] *= f;
-    }
-  }
-}
 
 class BestImpulse {
  public:
   /// `history`: where each offer is recorded, or null.
-  BestImpulse(double tolerance, bool max_dissipation, std::vector<HistoryEntry>* history)
-      : tolerance_(tolerance), max_dissipation_(max_dissipation), history_(history) {
+  BestImpulse(double tolerance, bool max_dissipation, std::vector<HistoryEntry>* history,
+              Memory memory = std::pmr::get_default_resource())
+      : tolerance_(tolerance),
+        max_dissipation_(max_dissipation),
+        impulse_(memory),
+        history_(history) {
     if (history_) start_ = Clock::now();
   }
 
   /// Takes p.lambda, projected on its cones, if its residual is the least so far; p.v is up to date
-  /// afterwards. True once an impulse within the tolerance has been seen. `recorded`: the history has
-  /// this point already.
+  /// afterwards. True once an impulse within the tolerance has been seen. `recorded`: the history
+  /// has this point already.
   bool offer(contact::ExplicitProblem& p, SolveStage stage, bool recorded = false) {
     project_on_cones(p);
     contact::refresh_velocity(p);
     last_ = largest_residual(p, max_dissipation_);
     if (!(last_ < __builtin_inf())) last_ = __builtin_inf();
     if (!recorded) record(stage, last_);
-    if (last_ < residual_ || impulse_.empty()) {
-      residual_ = last_;
-      stage_ = stage;
-      if (last_ < __builtin_inf())
-        impulse_.assign(p.lambda, p.lambda + 3 * p.n);
-      else
-        impulse_.assign(3 * p.n, 0.0);
-    }
+    keep(p, stage, last_);
     return solved();
+  }
+  /// The same for an impulse in its cones whose residual is known.
+  void keep(const contact::ExplicitProblem& p, SolveStage stage, double residual) {
+    if (!(residual < residual_ || impulse_.empty())) return;
+    residual_ = residual;
+    stage_ = stage;
+    if (residual < __builtin_inf())
+      impulse_.assign(p.lambda, p.lambda + 3 * p.n);
+    else
+      impulse_.assign(3 * p.n, 0.0);
   }
   /// Puts the best impulse back into the problem; p.v is up to date afterwards.
   void restore(contact::ExplicitProblem& p) const {
@@ -69,14 +65,14 @@ class BestImpulse {
   bool max_dissipation() const { return max_dissipation_; }
   bool records() const { return history_ != nullptr; }
   SolveStage stage() const { return stage_; }
-  const std::vector<double>& impulse() const { return impulse_; }
+  const Doubles& impulse() const { return impulse_; }
 
  private:
   using Clock = std::chrono::steady_clock;
   double tolerance_, residual_ = __builtin_inf(), last_ = __builtin_inf();
   bool max_dissipation_;
   SolveStage stage_ = SolveStage::kStart;
-  std::vector<double> impulse_;
+  Doubles impulse_;
   std::vector<HistoryEntry>* history_;
   Clock::time_point start_;
 };

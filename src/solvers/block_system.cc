@@ -5,11 +5,17 @@
 
 namespace stickslip::solvers {
 
-BlockSystem::BlockSystem() = default;
+BlockSystem::BlockSystem(int contacts, Memory memory) : matrix_(memory), pivot_(memory) {
+  const size_t rows = 3 * size_t(contacts);
+  if (rows > kDenseRows) return;
+  matrix_.reserve(rows * padded_row(int(rows) + 1) + kRowChunk);
+  pivot_.reserve(rows);
+}
 BlockSystem::~BlockSystem() = default;
 
-/// The matrix of (C28), rows `stride` apart. Three rows at a time, over runs of contacts that follow each other in G.
-void BlockSystem::assemble_dense(const contact::ExplicitProblem& p, const std::vector<int>& active,
+/// The matrix of (C28), rows `stride` apart. Three rows at a time, over runs of contacts that
+/// follow each other in G.
+void BlockSystem::assemble_dense(const contact::ExplicitProblem& p, const Integers& active,
                                  const double* A, const double* B, int stride) {
   const int n = int(active.size());
   matrix_.resize(size_t(size_) * stride + kRowChunk);
@@ -20,8 +26,7 @@ void BlockSystem::assemble_dense(const contact::ExplicitProblem& p, const std::v
     const auto multiply = [&](int first, int count, const double* from, int apart) {
       for (int r = 0; r < 3; ++r) {
         double* __restrict__ to = row + long(r) * stride + first;
-        const double *__restrict__ g0 = from, *__restrict__ g1 = from + apart,
-                     *__restrict__ g2 = g1 + apart;
+        const double* __restrict__ g0 = from, * __restrict__ g1 = from + apart, * __restrict__ g2 = g1 + apart;
         const double b0 = b[3 * r], b1 = b[3 * r + 1], b2 = b[3 * r + 2];
         for (int k = 0; k < count; ++k) to[k] = madd(b0, g0[k], madd(b1, g1[k], b2 * g2[k]));
       }
@@ -40,11 +45,12 @@ void BlockSystem::assemble_dense(const contact::ExplicitProblem& p, const std::v
       }
     }
     for (int r = 0; r < 3; ++r)
-      for (int s = 0; s < 3; ++s) row[long(r) * stride + 3 * a + s] += A[9L * active[a] + 3 * r + s];
+      for (int s = 0; s < 3; ++s)
+        row[long(r) * stride + 3 * a + s] += A[9L * active[a] + 3 * r + s];
   }
 }
 
-bool BlockSystem::solve_once(const contact::ExplicitProblem& p, const std::vector<int>& active,
+bool BlockSystem::solve_once(const contact::ExplicitProblem& p, const Integers& active,
                              const double* A, const double* B, double* x) {
   size_ = 3 * int(active.size());
   if (size_ > kDenseRows) {
@@ -59,8 +65,8 @@ bool BlockSystem::solve_once(const contact::ExplicitProblem& p, const std::vecto
   return true;
 }
 
-bool BlockSystem::factor(const contact::ExplicitProblem& p, const std::vector<int>& active,
-                         const double* A, const double* B) {
+bool BlockSystem::factor(const contact::ExplicitProblem& p, const Integers& active, const double* A,
+                         const double* B) {
   size_ = 3 * int(active.size());
   large_ = size_ > kDenseRows;
   if (large_) {

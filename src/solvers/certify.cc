@@ -8,14 +8,14 @@ namespace {
 
 using contact::LocalContact;
 
-constexpr double kOnCone = 1e-12;   // of mu lambda_z: impulses this near to the mantle lie on it
-constexpr double kSlides = 1e-6;    // of the largest |c|: below, a contact has no sliding direction
+constexpr double kOnCone = 1e-12;  // of mu lambda_z: impulses this near to the mantle lie on it
+constexpr double kSlides = 1e-6;   // of the largest |c|: below, a contact has no sliding direction
 
 double length2(const double x[3]) { return std::sqrt(x[0] * x[0] + x[1] * x[1]); }
 
-/// (C60) by (C61): the least |d| for which v + d and the impulse obey Signorini's condition and Coulomb's law: at rest
-/// any v + d that opens; inside the cone v + d = 0; on its mantle v + d = -s e, s >= 0. What an impulse
-/// has outside its cone counts as a velocity too.
+/// (C60) by (C61): the least |d| for which v + d and the impulse obey Signorini's condition and
+/// Coulomb's law: at rest any v + d that opens; inside the cone v + d = 0; on its mantle v + d = -s
+/// e, s >= 0. What an impulse has outside its cone counts as a velocity too.
 double backward_error(const LocalContact<double>& k, const double v[3], const double l[3]) {
   const double push = std::max(l[2], 0.0), t = length2(l), limit = k.mu * push;
   const double outside = k.scale * (std::max(t - limit, 0.0) + std::max(-l[2], 0.0));
@@ -57,8 +57,8 @@ Certificate certify(const contact::ExplicitProblem& p, bool max_dissipation) {
     out.cone_violation = std::max(out.cone_violation, length2(l) - k.mu * l[2]);
     if (speed > kSlides * fastest && k.scale * length2(l) > kSlides * fastest)
       out.direction_error = std::max(out.direction_error, direction_angle(v, l));
-    out.power = std::max(out.power, std::fabs(l[0] * v[0] + l[1] * v[1] +
-                                              l[2] * (v[2] + k.mu * speed)));
+    out.power =
+        std::max(out.power, std::fabs(l[0] * v[0] + l[1] * v[1] + l[2] * (v[2] + k.mu * speed)));
   }
   return out;
 }

@@ -14,17 +14,16 @@ namespace {
 
 using contact::ExplicitProblem;
 
-/// Contacts up to which a Newton step costs about as much as a few sweeps.
-constexpr int kRobotSized = BlockSystem::kDenseRows / 3;
-
-/// One visit of contact i, (C4) to (C9): its exact impulse with the others held, a sliding one by a single Halley step
-/// from its last direction, since the sweep will come back. Returns the squared velocity change.
+/// One visit of contact i, (C4) to (C9): its exact impulse with the others held, a sliding one by a
+/// single Halley step from its last direction, since the sweep will come back. Returns the squared
+/// velocity change.
 double visit(ExplicitProblem& p, int i, double speed, double direction[2]) {
   const contact::LocalContact<double>& k = p.local[i];
   double c[3], next[3];
   contact::velocity_without_own(p, i, c);
   if (contact::is_singular(k)) [[unlikely]] {
-    const contact::SlipSolution s = contact::solve_single<contact::Method::kHalley, false>(k, c, speed);
+    const contact::SlipSolution s =
+        contact::solve_single<contact::Method::kHalley, false>(k, c, speed);
     next[0] = s.x, next[1] = s.y, next[2] = s.z;
   } else {
     const contact::Reduced<double> r = contact::reduce(k, c[0], c[1], c[2]);
@@ -44,9 +43,20 @@ double visit(ExplicitProblem& p, int i, double speed, double direction[2]) {
 
 class Chain {
  public:
-  Chain(ExplicitProblem& p, BestImpulse& best, int max_sweeps, Effort& effort)
-      : p_(p), best_(best), max_sweeps_(max_sweeps), effort_(effort), directions_(2 * p.n), newton_(p) {}
+  Chain(ExplicitProblem& p, BestImpulse& best, int max_sweeps, Effort& effort,
+        Memory memory = std::pmr::get_default_resource())
+      : p_(p),
+        best_(best),
+        max_sweeps_(max_sweeps),
+        effort_(effort),
+        memory_(memory),
+        directions_(2 * std::size_t(p.n), memory),
+        newton_(p, memory) {}
 
+  void run_brief() {
+    if (proximal_newton(best_.impulse(), 1e-3, 60)) return;
+    interior_point(ShiftRule::kExact);
+  }
   void run() {
     if (p_.n <= kRobotSized ? sweeps_with_newton() : patient_sweeps()) return;
     // What is left is hyperstatic, ill-conditioned or large.
@@ -59,15 +69,15 @@ class Chain {
       if (stubborn_sweeps(alpha < 1e-3 ? 1 : 0.7)) return;
       if (proximal_newton(best_.impulse(), alpha, 150)) return;
     }
-    proximal_newton(std::vector<double>(3 * p_.n), 1.0, 150);
+    proximal_newton(Doubles(3 * p_.n), 1.0, 150);
     // The best impulse may still be worse than none.
     std::fill(p_.lambda, p_.lambda + 3 * p_.n, 0.0);
     best_.offer(p_, SolveStage::kStart);
   }
 
  private:
-  /// Contacts that do not couple, even through others, are solved apart: a hard island no longer holds up easy
-  /// ones. True if there was more than one island; then each has had its turn.
+  /// Contacts that do not couple, even through others, are solved apart: a hard island no longer
+  /// holds up easy ones. True if there was more than one island; then each has had its turn.
   bool separate_islands() {
     const Islands islands(p_);
     if (islands.count() < 2) return false;
@@ -120,8 +130,8 @@ class Chain {
     return best_.offer(p_, SolveStage::kSweeps);
   }
 
-  /// Sweeps for as long as a block of them is worth it. A sweep of a large problem costs a hundredth of a Newton
-  /// step.
+  /// Sweeps for as long as a block of them is worth it. A sweep of a large problem costs a
+  /// hundredth of a Newton step.
   bool patient_sweeps() {
     constexpr int kBlock = 25;
     constexpr double kGain = 0.7;
@@ -148,7 +158,7 @@ class Chain {
     return best_.offer(p_, SolveStage::kSweeps);
   }
 
-  bool proximal_newton(const std::vector<double>& start, double alpha, int steps) {
+  bool proximal_newton(const Doubles& start, double alpha, int steps) {
     std::copy(start.begin(), start.end(), p_.lambda);
     const int before = newton_.steps();
     const bool solved = newton_.run(best_, alpha, steps);
@@ -157,12 +167,12 @@ class Chain {
   }
   /// Small weights keep what a method has found out about which contacts are open, stick and slide.
   bool polish() {
-    const std::vector<double> end(p_.lambda, p_.lambda + 3 * p_.n);
+    const Doubles end(p_.lambda, p_.lambda + 3 * p_.n, memory_);
     return proximal_newton(end, 1e-8, 40) || proximal_newton(end, 1e-5, 40);
   }
 
   bool interior_point(ShiftRule shift) {
-    InteriorPoint method(p_);
+    InteriorPoint method(p_, memory_);
     const bool solved = method.run(best_, shift, 80);
     effort_.interior_point_steps += method.iterations();
     return solved || polish();
@@ -180,7 +190,8 @@ class Chain {
   BestImpulse& best_;
   int max_sweeps_;
   Effort& effort_;
-  std::vector<double> directions_;
+  Memory memory_;
+  Doubles directions_;
   ProxNewton newton_;
 };
 
@@ -205,6 +216,17 @@ void run_chain(ExplicitProblem& p, BestImpulse& best, int max_sweeps, Effort& ef
     run_max_dissipation(p, best, max_sweeps, effort);
   else
     Chain(p, best, max_sweeps, effort).run();
+}
+
+std::size_t brief_chain_bytes(int contacts) {
+  // Vectors of the chain, Newton and interior point (about 150 per contact), their two systems,
+  // padding.
+  const std::size_t n = contacts, rows = 3 * n;
+  return sizeof(double) * (160 * n + 2 * (rows * (rows + 8) + 8)) + 4096;
+}
+
+void run_brief_chain(ExplicitProblem& p, BestImpulse& best, Effort& effort, Memory memory) {
+  Chain(p, best, 1, effort, memory).run_brief();
 }
 
 }  // namespace stickslip::solvers

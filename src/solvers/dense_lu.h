@@ -1,6 +1,6 @@
-// Dense systems of robot size (up to some hundred rows), row-major, with partial pivoting, in place, without
-// allocation: LU factors for several right-hand sides, and one elimination for a single one (docs/theory/solvers.md
-// (C28)).
+// Dense systems of robot size (up to some hundred rows), row-major, with partial pivoting, in
+// place, without allocation: LU factors for several right-hand sides, and one elimination for a
+// single one (docs/theory/solvers.md (C28)).
 #pragma once
 #include "lane/pack.h"
 
@@ -17,13 +17,12 @@ inline int pivot_row(const double* a, int m, int stride, int j) {
 
 /// Numbers handled at once along a row; rows of `eliminate` are padded to whole chunks.
 inline constexpr int kRowChunk = 4;
-constexpr int padded_row(int columns) {
-  return (columns + kRowChunk - 1) / kRowChunk * kRowChunk;
-}
+constexpr int padded_row(int columns) { return (columns + kRowChunk - 1) / kRowChunk * kRowChunk; }
 
-/// x with A x = b, for the (m, m + 1) matrix [A, b] with rows `stride` = padded_row(m + 1) apart, which it
-/// destroys. Columns left of the pivot are dead, so every update may start at a whole chunk. A column without a
-/// pivot gets a tiny one: x is then huge or not finite, and the caller rejects it.
+/// x with A x = b, for the (m, m + 1) matrix [A, b] with rows `stride` = padded_row(m + 1) apart,
+/// which it destroys. Columns left of the pivot are dead, so every update may start at a whole
+/// chunk. A column without a pivot gets a tiny one: x is then huge or not finite, and the caller
+/// rejects it.
 inline void eliminate(double* a, int m, int stride, double* x) {
   using Chunk = Pack<double, kRowChunk>;
   const auto load = [](const double* from) {
@@ -49,7 +48,8 @@ inline void eliminate(double* a, int m, int stride, double* x) {
     for (int i = j + 1; i < m; ++i) {
       double* row = a + long(i) * stride;
       const Chunk f(-(row[j] * inverse));
-      for (int k = next; k <= m; k += kRowChunk) store(row + k, madd(load(top + k), f, load(row + k)));
+      for (int k = next; k <= m; k += kRowChunk)
+        store(row + k, madd(load(top + k), f, load(row + k)));
     }
   }
   for (int i = m - 1; i >= 0; --i) {

@@ -5,8 +5,8 @@
 namespace stickslip::solvers {
 namespace {
 
-constexpr int kSparseFrom = 60;       // contacts; below, dense rows are faster than indices
-constexpr double kDenseShare = 0.5;   // of the blocks
+constexpr int kSparseFrom = 60;      // contacts; below, dense rows are faster than indices
+constexpr double kDenseShare = 0.5;  // of the blocks
 
 }  // namespace
 
@@ -33,9 +33,7 @@ ExplicitView::ExplicitView(const ContactProblem& problem, const std::vector<doub
 
 void ExplicitView::drop_zero_blocks(const ContactProblem& problem) {
   const int n = view.n, m = 3 * n;
-  const auto block = [&](int i, int j) {
-    return problem.delassus.data() + 3L * i * m + 3 * j;
-  };
+  const auto block = [&](int i, int j) { return problem.delassus.data() + 3L * i * m + 3 * j; };
   starts_.assign(1, 0);
   for (int i = 0; i < n; ++i) {
     for (int j = 0; j < n; ++j)

@@ -8,8 +8,8 @@
 
 namespace stickslip::solvers {
 
-/// Refers to `problem`, which must outlive it. Large dense problems of mostly zero blocks are kept block
-/// sparse.
+/// Refers to `problem`, which must outlive it. Large dense problems of mostly zero blocks are kept
+/// block sparse.
 class ExplicitView {
  public:
   ExplicitView(const ContactProblem& problem, const std::vector<double>& impulse);

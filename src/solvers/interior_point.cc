@@ -72,14 +72,33 @@ void inverse_square(const Scaling& s, double out[9]) {
 
 }  // namespace
 
-InteriorPoint::InteriorPoint(contact::ExplicitProblem& p) : p_(p), A_(9 * p.n), B_(9 * p.n) {
+InteriorPoint::InteriorPoint(contact::ExplicitProblem& p, Memory memory)
+    : p_(p),
+      system_(p.n, memory),
+      active_(memory),
+      A_(9 * std::size_t(p.n), memory),
+      B_(9 * std::size_t(p.n), memory),
+      right_(memory),
+      x_(memory),
+      y_(memory),
+      dx_(memory),
+      dy_(memory),
+      F_(memory),
+      lambda_(memory),
+      complementarity_(memory),
+      scaling_(memory),
+      shift_(memory),
+      least_(3 * std::size_t(p.n), memory),
+      D_(memory) {
+  active_.reserve(p.n);
   for (int i = 0; i < p.n; ++i)
     if (p.local[i].inv_zz > 0) active_.push_back(i);
-  const std::size_t m = 3 * active_.size();
-  for (auto* v : {&x_, &y_, &dx_, &dy_, &F_, &lambda_, &right_}) v->resize(m);
-  scaling_.resize(4 * active_.size());
-  shift_.resize(active_.size());
-  D_.resize(2 * active_.size());
+  const std::size_t count = active_.size();
+  for (Doubles* v : {&x_, &y_, &dx_, &dy_, &F_, &lambda_, &right_, &complementarity_})
+    v->resize(3 * count);
+  scaling_.resize(4 * count);
+  shift_.resize(count);
+  D_.resize(2 * count);
 }
 
 /// D of (C40) and the first x and y.
@@ -110,12 +129,13 @@ void InteriorPoint::evaluate(ShiftRule shift, bool first) {
     const double t = tangential(y_.data() + 3 * a);
     shift_[a] = shift == ShiftRule::kDamped ? (first ? 0 : 0.5 * (shift_[a] + t)) : t;
     for (int r = 0; r < 3; ++r)
-      F_[3 * a + r] = D_[2 * a + (r == 2)] * p_.v[3 * active_[a] + r] +
-                      (r == 2 ? shift_[a] : 0) - y_[3 * a + r];
+      F_[3 * a + r] = D_[2 * a + (r == 2)] * p_.v[3 * active_[a] + r] + (r == 2 ? shift_[a] : 0) -
+                      y_[3 * a + r];
   }
 }
 
-/// (D G D + C S^-2) of (C45) in the unknown dlambda = D dx, with C = 1 - z t^T where the shift is exact.
+/// (D G D + C S^-2) of (C45) in the unknown dlambda = D dx, with C = 1 - z t^T where the shift is
+/// exact.
 bool InteriorPoint::factor(ShiftRule shift) {
   for (std::size_t a = 0; a < active_.size(); ++a) {
     const double *x = x_.data() + 3 * a, *y = y_.data() + 3 * a;
@@ -138,7 +158,7 @@ bool InteriorPoint::factor(ShiftRule shift) {
 }
 
 /// (C44) by (C45): dx, dy with S^-1 dx + S dy = lambda \ complementarity and the linearized F = 0.
-void InteriorPoint::step_direction(const std::vector<double>& complementarity) {
+void InteriorPoint::step_direction(const Doubles& complementarity) {
   // right_ becomes S^-1 k, dx_ the right-hand side C S^-1 k - F.
   for (std::size_t a = 0; a < active_.size(); ++a) {
     const Scaling s = {{scaling_[4 * a], scaling_[4 * a + 1], scaling_[4 * a + 2]},
@@ -176,7 +196,7 @@ bool InteriorPoint::run(BestImpulse& best, ShiftRule shift, int max_iterations) 
   exact_ = shift == ShiftRule::kExact;
   start();
   double least = INFINITY;
-  std::vector<double> complementarity(m);
+  Doubles& complementarity = complementarity_;
   for (int k = 0, since = 0; k < max_iterations && since < kPatience; ++k, ++since) {
     evaluate(shift, k == 0);
     if (best.offer(p_, SolveStage::kInteriorPoint)) return true;
@@ -198,8 +218,7 @@ bool InteriorPoint::run(BestImpulse& best, ShiftRule shift, int max_iterations) 
     step_direction(complementarity);
     const double reach = std::min(1.0, longest_step());
     double left = 0;
-    for (std::size_t i = 0; i < m; ++i)
-      left += (x_[i] + reach * dx_[i]) * (y_[i] + reach * dy_[i]);
+    for (std::size_t i = 0; i < m; ++i) left += (x_[i] + reach * dx_[i]) * (y_[i] + reach * dy_[i]);
     const double share = std::clamp(left / gap, 0.0, 1.0);
     const double center = std::max(share * share * share, 1e-8) * gap / double(active_.size());
     // Corrector: what the predictor neglected, and back towards the central path.
@@ -210,8 +229,7 @@ bool InteriorPoint::run(BestImpulse& best, ShiftRule shift, int max_iterations) 
       scale(s, -1, dx_.data() + 3 * a, sx);
       scale(s, 1, dy_.data() + 3 * a, sy);
       product(sx, sy, second);
-      for (int r = 0; r < 3; ++r)
-        complementarity[3 * a + r] += (r == 2 ? center : 0) - second[r];
+      for (int r = 0; r < 3; ++r) complementarity[3 * a + r] += (r == 2 ? center : 0) - second[r];
     }
     step_direction(complementarity);
     const double t = std::min(1.0, 0.995 * longest_step());
@@ -223,7 +241,7 @@ bool InteriorPoint::run(BestImpulse& best, ShiftRule shift, int max_iterations) 
     }
     if (!std::isfinite(sum) || t < 1e-10) break;
   }
-  if (!least_.empty()) std::copy(least_.begin(), least_.end(), p_.lambda);
+  if (least < INFINITY) std::copy(least_.begin(), least_.end(), p_.lambda);
   contact::refresh_velocity(p_);
   return best.solved();
 }

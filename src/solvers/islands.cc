@@ -38,7 +38,8 @@ Island::Island(const contact::ExplicitProblem& p, const std::vector<int>& contac
       if (at == contacts.end() || *at != j) return;
       problem_.block_columns.push_back(int(at - contacts.begin()));
       for (int r = 0; r < 3; ++r)
-        problem_.delassus.insert(problem_.delassus.end(), g + long(r) * stride, g + long(r) * stride + 3);
+        problem_.delassus.insert(problem_.delassus.end(), g + long(r) * stride,
+                                 g + long(r) * stride + 3);
     });
     problem_.block_starts.push_back(int(problem_.block_columns.size()));
     problem_.free_velocity.insert(problem_.free_velocity.end(), p.c + 3 * i, p.c + 3 * i + 3);

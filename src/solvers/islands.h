@@ -1,5 +1,5 @@
-// Islands (docs/theory/solvers.md, section 7): groups of contacts that couple with each other, directly or
-// through others, and with no one else.
+// Islands (docs/theory/solvers.md, section 7): groups of contacts that couple with each other,
+// directly or through others, and with no one else.
 #pragma once
 #include <stickslip/contact.h>
 

@@ -22,8 +22,8 @@ Eigen::Matrix3d system_block(const double* A, const double* B, int i, int j, con
 }
 
 /// Column by column, which the symmetric pattern gives for nothing: column j has the rows of row j.
-Sparse assemble_sparse(const contact::ExplicitProblem& p, const std::vector<int>& active,
-                       const double* A, const double* B) {
+Sparse assemble_sparse(const contact::ExplicitProblem& p, const Integers& active, const double* A,
+                       const double* B) {
   const int n = int(active.size());
   std::vector<int> place(p.n, -1);
   for (int a = 0; a < n; ++a) place[active[a]] = a;
@@ -31,7 +31,8 @@ Sparse assemble_sparse(const contact::ExplicitProblem& p, const std::vector<int>
   Eigen::VectorXi counts(3 * n);
   for (int a = 0; a < n; ++a) {
     int blocks = 0;
-    contact::for_each_block(p, active[a], [&](int j, const double*, int) { blocks += place[j] >= 0; });
+    contact::for_each_block(p, active[a],
+                            [&](int j, const double*, int) { blocks += place[j] >= 0; });
     counts.segment<3>(3 * a).setConstant(3 * blocks);
   }
   m.reserve(counts);
@@ -46,7 +47,7 @@ Sparse assemble_sparse(const contact::ExplicitProblem& p, const std::vector<int>
   return m;
 }
 
-Eigen::MatrixXd assemble_full(const contact::ExplicitProblem& p, const std::vector<int>& active,
+Eigen::MatrixXd assemble_full(const contact::ExplicitProblem& p, const Integers& active,
                               const double* A, const double* B) {
   const int n = int(active.size());
   Eigen::MatrixXd m(3 * n, 3 * n);
@@ -69,8 +70,8 @@ struct LargeSystem::Factors {
 LargeSystem::LargeSystem() : factors_(std::make_unique<Factors>()) {}
 LargeSystem::~LargeSystem() = default;
 
-bool LargeSystem::factor(const contact::ExplicitProblem& p, const std::vector<int>& active,
-                         const double* A, const double* B) {
+bool LargeSystem::factor(const contact::ExplicitProblem& p, const Integers& active, const double* A,
+                         const double* B) {
   Factors& f = *factors_;
   f.is_sparse = p.starts != nullptr;
   if (!f.is_sparse) {
@@ -90,7 +91,7 @@ void LargeSystem::solve(double* x) {
 }
 
 bool is_definite(const contact::ExplicitProblem& p, double shift) {
-  std::vector<int> all(p.n);
+  Integers all(p.n);
   std::vector<double> A(9L * p.n), B(9L * p.n);
   for (int i = 0; i < p.n; ++i) {
     all[i] = i;

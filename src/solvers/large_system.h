@@ -1,11 +1,11 @@
-// Block systems beyond robot size, by Eigen: sparse LU where G is block sparse, blocked dense LU where it
-// is full. Apart, because only this and the check for definiteness see Eigen (docs/theory/solvers.md
-// (C28)).
+// Block systems beyond robot size, by Eigen: sparse LU where G is block sparse, blocked dense LU
+// where it is full. Apart, because only this and the check for definiteness see Eigen
+// (docs/theory/solvers.md (C28)).
 #pragma once
 #include <memory>
-#include <vector>
 
 #include "contact/explicit_problem.h"
+#include "solvers/memory.h"
 
 namespace stickslip::solvers {
 
@@ -14,7 +14,7 @@ class LargeSystem {
   LargeSystem();
   ~LargeSystem();
 
-  bool factor(const contact::ExplicitProblem& p, const std::vector<int>& active, const double* A,
+  bool factor(const contact::ExplicitProblem& p, const Integers& active, const double* A,
               const double* B);
   void solve(double* x);
 

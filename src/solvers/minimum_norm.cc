@@ -7,9 +7,10 @@
 namespace stickslip::solvers {
 namespace {
 
-constexpr int kRounds = 200;          // of projections; one where no cone is reached
-constexpr double kSettled = 1e-15;    // change of a round, relative to the impulses
-constexpr double kRankTolerance = 1e-11;  // pivots of G below this much of the largest count as zero
+constexpr int kRounds = 200;        // of projections; one where no cone is reached
+constexpr double kSettled = 1e-15;  // change of a round, relative to the impulses
+constexpr double kRankTolerance =
+    1e-11;  // pivots of G below this much of the largest count as zero
 
 bool sticks(const contact::ExplicitProblem& p, int i, double speed) {
   const double *v = p.v + 3 * i, *l = p.lambda + 3 * i;
@@ -26,15 +27,17 @@ Eigen::MatrixXd tangential_block(const contact::ExplicitProblem& p, const std::v
     contact::for_each_block(p, stick[a], [&](int j, const double* g, int stride) {
       if (place[j] < 0) return;
       for (int r = 0; r < 2; ++r)
-        for (int s = 0; s < 2; ++s) G(2 * Eigen::Index(a) + r, 2 * place[j] + s) = g[r * stride + s];
+        for (int s = 0; s < 2; ++s)
+          G(2 * Eigen::Index(a) + r, 2 * place[j] + s) = g[r * stride + s];
     });
   return G;
 }
 
 }  // namespace
 
-// (C70). The answer is the projection of zero on {x : G x = G x0} and the friction discs, by Dykstra's alternating
-// projections. G is semidefinite, so what its tangential block does not see no other row sees either.
+// (C70). The answer is the projection of zero on {x : G x = G x0} and the friction discs, by
+// Dykstra's alternating projections. G is semidefinite, so what its tangential block does not see
+// no other row sees either.
 void minimize_tangential_impulses(contact::ExplicitProblem& p, double speed) {
   std::vector<int> stick;
   for (int i = 0; i < p.n; ++i)
@@ -58,7 +61,8 @@ void minimize_tangential_impulses(contact::ExplicitProblem& p, double speed) {
     const Eigen::VectorXd before = x, outside = x + correction;
     for (Eigen::Index a = 0; a < m / 2; ++a) {
       const double length = outside.segment<2>(2 * a).norm();
-      x.segment<2>(2 * a) = outside.segment<2>(2 * a) * (length > limit[a] ? limit[a] / length : 1.0);
+      x.segment<2>(2 * a) =
+          outside.segment<2>(2 * a) * (length > limit[a] ? limit[a] / length : 1.0);
     }
     correction = outside - x;
     if (correction.isZero(0)) break;

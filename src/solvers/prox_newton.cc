@@ -6,16 +6,16 @@
 namespace stickslip::solvers {
 namespace {
 
-constexpr int kMaxInner = 15;   // Newton steps of one subproblem
+constexpr int kMaxInner = 15;  // Newton steps of one subproblem
 constexpr int kMaxHalvings = 10;
-constexpr int kMemory = 4;      // merits that a step may be compared with: non-monotone
+constexpr int kMemory = 4;  // merits that a step may be compared with: non-monotone
 constexpr double kSmallestAlpha = 1e-12, kLargestAlpha = 1e5;
 
 }  // namespace
 
-ProxNewton::ProxNewton(contact::ExplicitProblem& p)
-    : p_(p), memory_(std::make_unique_for_overwrite<double[]>(33 * std::size_t(p.n) + 1)) {
-  double* next = memory_.get();
+ProxNewton::ProxNewton(contact::ExplicitProblem& p, Memory memory)
+    : p_(p), system_(p.n, memory), memory_(33 * std::size_t(p.n), memory), active_(memory) {
+  double* next = memory_.data();
   for (double** vector : {&center_, &origin_, &direction_, &u_, &F_}) {
     *vector = next;
     next += 3L * p.n;
@@ -29,8 +29,7 @@ ProxNewton::ProxNewton(contact::ExplicitProblem& p)
 void ProxNewton::shift_velocity(double alpha) {
   for (int i = 0; i < p_.n; ++i) {
     const double weight = alpha * p_.local[i].scale;
-    for (int r = 3 * i; r < 3 * i + 3; ++r)
-      u_[r] = p_.v[r] + weight * (p_.lambda[r] - center_[r]);
+    for (int r = 3 * i; r < 3 * i + 3; ++r) u_[r] = p_.v[r] + weight * (p_.lambda[r] - center_[r]);
   }
 }
 
@@ -45,8 +44,8 @@ double ProxNewton::merit() {
   return std::sqrt(sum);
 }
 
-/// Newton direction (C39) at (lambda, u). Contacts that are not active go to zero; their part moves to the
-/// right-hand side.
+/// Newton direction (C39) at (lambda, u). Contacts that are not active go to zero; their part moves
+/// to the right-hand side.
 bool ProxNewton::direction(double alpha) {
   active_.clear();
   bool some_leave = false;
@@ -95,7 +94,8 @@ bool ProxNewton::direction(double alpha) {
   return std::isfinite(sum);
 }
 
-/// Newton with backtracking (C37) on one subproblem, from p.lambda (p.v up to date). True if solved.
+/// Newton with backtracking (C37) on one subproblem, from p.lambda (p.v up to date). True if
+/// solved.
 bool ProxNewton::subproblem(double alpha, double start_residual, double tolerance, int max_steps) {
   double history[kMemory];
   shift_velocity(alpha);

@@ -5,9 +5,6 @@
 // however redundant the contacts are. alpha shrinks after each solved subproblem, also where the
 // residual has not halved (a rule driven by the residual loses stacks), and grows after a failure.
 #pragma once
-#include <memory>
-#include <vector>
-
 #include "solvers/alart_curnier.h"
 #include "solvers/best_impulse.h"
 #include "solvers/block_system.h"
@@ -16,13 +13,14 @@ namespace stickslip::solvers {
 
 class ProxNewton {
  public:
-  explicit ProxNewton(contact::ExplicitProblem& p);
+  explicit ProxNewton(contact::ExplicitProblem& p,
+                      Memory memory = std::pmr::get_default_resource());
 
   /// Starts at p.lambda with proximal weight alpha; offers what it finds. True once solved; at most
   /// `max_steps` Newton steps. Leaves p.lambda anywhere.
   bool run(BestImpulse& best, double alpha, int max_steps);
-  /// One undamped step from p.lambda with weight alpha; p.v must be up to date, and is not afterwards. False, and
-  /// nothing changed, where the step is not finite.
+  /// One undamped step from p.lambda with weight alpha; p.v must be up to date, and is not
+  /// afterwards. False, and nothing changed, where the step is not finite.
   bool step(double alpha);
   int steps() const { return steps_; }
 
@@ -35,9 +33,9 @@ class ProxNewton {
   contact::ExplicitProblem& p_;
   BlockSystem system_;
   // One block for all: small problems would spend more time on allocations than on a step.
-  std::unique_ptr<double[]> memory_;
+  Doubles memory_;
   double *center_, *origin_, *direction_, *u_, *F_, *A_, *B_;  // (3n) and, A and B, (9n)
-  std::vector<int> active_;
+  Integers active_;
   int steps_ = 0;
 };
 

@@ -1,5 +1,5 @@
-// Checks of the public problem types, (C1). Every text names the argument, where it is wrong, and what it
-// must be.
+// Checks of the public problem types, (C1). Every text names the argument, where it is wrong, and
+// what it must be.
 #include "solvers/validate.h"
 
 #include <stickslip/contact.h>
@@ -17,8 +17,9 @@
 namespace stickslip {
 namespace {
 
-constexpr double kAsymmetry = 1e-9;   // of the largest entry: rounding
-constexpr double kIndefinite = 1e-6;  // of the largest diagonal entry: rounding, also of files in text
+constexpr double kAsymmetry = 1e-9;  // of the largest entry: rounding
+constexpr double kIndefinite =
+    1e-6;  // of the largest diagonal entry: rounding, also of files in text
 
 template <class... Parts>
 [[noreturn]] void fail(const Parts&... parts) {
@@ -61,8 +62,8 @@ void check_diagonal(int row, double x) {
 void check_pair(int row, int column, double a, double b, double allowed) {
   const double apart = std::fabs(a - b);
   if (apart > allowed)
-    fail("ContactProblem.delassus is not symmetric: [", row, ", ", column, "] and [", column, ", ", row,
-         "] differ by ", apart, " 1/kg; at most ", kAsymmetry,
+    fail("ContactProblem.delassus is not symmetric: [", row, ", ", column, "] and [", column, ", ",
+         row, "] differ by ", apart, " 1/kg; at most ", kAsymmetry,
          " of the largest entry is taken for rounding (use (G + G.T) / 2 if it is)");
 }
 
@@ -70,8 +71,9 @@ void check_pair(int row, int column, double a, double b, double allowed) {
   fail("ContactProblem.delassus[", row, ", ", column, "] is ", x, "; every entry must be finite");
 }
 
-/// Every entry finite, no negative diagonal, both triangles equal but for rounding. Problems of robot size are
-/// checked in every solve, so the loops are plain sums and maxima; only a fault looks for its place.
+/// Every entry finite, no negative diagonal, both triangles equal but for rounding. Problems of
+/// robot size are checked in every solve, so the loops are plain sums and maxima; only a fault
+/// looks for its place.
 void check_dense(const std::vector<double>& G, int m) {
   constexpr int kLanes = 4;
   double sums[kLanes] = {}, most[kLanes] = {};
@@ -114,8 +116,8 @@ void check_blocks(const ContactProblem& p, int n) {
          "; it must run from 0 to ", blocks, ", the number of block_columns");
   for (int i = 0; i < n; ++i) {
     if (starts[i] > starts[i + 1])
-      fail("ContactProblem.block_starts[", i + 1, "] is ", starts[i + 1], ", less than the one before, ",
-           starts[i]);
+      fail("ContactProblem.block_starts[", i + 1, "] is ", starts[i + 1],
+           ", less than the one before, ", starts[i]);
     bool diagonal = false;
     for (int k = starts[i]; k < starts[i + 1]; ++k) {
       const int j = p.block_columns[k];
@@ -127,7 +129,8 @@ void check_blocks(const ContactProblem& p, int n) {
       diagonal = diagonal || j == i;
     }
     if (!diagonal)
-      fail("ContactProblem: row ", i, " of blocks has no diagonal block; store it even where it is zero");
+      fail("ContactProblem: row ", i,
+           " of blocks has no diagonal block; store it even where it is zero");
   }
   if (p.delassus.size() != 9 * blocks)
     fail("ContactProblem.delassus has ", p.delassus.size(), " values; ", 9 * blocks,
@@ -182,8 +185,8 @@ bool is_small_definite(const std::vector<double>& G, int m, double shift) {
   return true;
 }
 
-/// J M^-1 J^T has no negative eigenvalue; one of at most kIndefinite of the largest diagonal entry is
-/// taken for rounding.
+/// J M^-1 J^T has no negative eigenvalue; one of at most kIndefinite of the largest diagonal entry
+/// is taken for rounding.
 void check_semidefinite(const ContactProblem& p, int n) {
   double largest = 0;
   for (int i = 0; i < n; ++i) {
@@ -199,8 +202,9 @@ void check_semidefinite(const ContactProblem& p, int n) {
   if (small ? is_small_definite(p.delassus, 3 * n, shift)
             : solvers::is_definite(solvers::ExplicitView(p, {}).view, shift))
     return;
-  fail("ContactProblem.delassus is indefinite: it has an eigenvalue below ", -shift, " 1/kg, that is -",
-       kIndefinite, " of the largest diagonal entry; J M^-1 J^T is positive semidefinite");
+  fail("ContactProblem.delassus is indefinite: it has an eigenvalue below ", -shift,
+       " 1/kg, that is -", kIndefinite,
+       " of the largest diagonal entry; J M^-1 J^T is positive semidefinite");
 }
 
 }  // namespace

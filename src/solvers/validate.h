@@ -1,4 +1,5 @@
-// Checks shared by the functions of the public contact API: what (C1) asks of G, c and mu. All throw ModelError.
+// Checks shared by the functions of the public contact API: what (C1) asks of G, c and mu. All
+// throw ModelError.
 #pragma once
 #include <stickslip/contact.h>
 

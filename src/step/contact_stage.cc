@@ -9,6 +9,7 @@
 #include "contact/per_contact.h"
 #include "contact/pgs.h"
 #include "contact/write_out.h"
+#include "solvers/chain.h"
 
 namespace stickslip::step {
 namespace {
@@ -24,6 +25,11 @@ int flat(LinkIndex link) { return link.slot * kMaxLanes + link.lane; }
 
 char* aligned_block(long bytes) {
   return static_cast<char*>(::operator new(static_cast<size_t>(bytes), std::align_val_t(64)));
+}
+/// Of `solve_by_chain`: the dense problem, its best impulse, the chain.
+size_t chain_bytes(int contacts) {
+  return sizeof(double) * (ContactStage::dense_size(contacts) + 3 * size_t(contacts)) +
+         solvers::brief_chain_bytes(contacts);
 }
 void free_block(char* block) { ::operator delete(block, std::align_val_t(64)); }
 
@@ -44,9 +50,12 @@ ContactStage::ContactStage(const Model& model, const dynamics::TreeLayout& layou
       shared_(layout.num_joints),
       index_(num_dofs_),
       memory_(nullptr, free_block),
+      chain_memory_(nullptr, free_block),
       overlap_(num_points_, num_dofs_) {
   const contact::FactoredCapacity capacity{std::max(num_points_, 1), num_dofs_};
   memory_.reset(aligned_block(contact::FactoredProblem<double>::required_bytes(capacity)));
+  chain_memory_.reset(
+      aligned_block(long(chain_bytes(std::min(num_points_, solvers::kRobotSized)))));
   problem_.attach(memory_.get(), capacity);
   for (int i = 0; i < num_points_; ++i) {
     active_[i].rows.path = paths_.data() + static_cast<size_t>(i) * max_depth;
@@ -54,10 +63,7 @@ ContactStage::ContactStage(const Model& model, const dynamics::TreeLayout& layou
   }
 }
 
-void ContactStage::reserve_explicit() {
-  const size_t n = num_points_;
-  dense_.resize(9 * n * n + 7 * n + contact::ExplicitProblem::workspace_size(num_points_));
-}
+void ContactStage::reserve_explicit() { dense_.resize(dense_size(num_points_)); }
 
 // ---- which points take part
 
@@ -232,7 +238,9 @@ void ContactStage::solve(const StepSolverOptions& options, double* warm, double 
     info.sweeps = found.sweeps;
     info.newton_steps = found.newton_steps + found.fallback_steps;
     info.residual = found.residual;
-    if (!found.converged) info.status = StepStatus::kNotConverged;
+    const bool chain = !o.max_dissipation && std::isfinite(found.residual);
+    if (!found.converged && !(chain && solve_by_chain(o.residual_tolerance, info)))
+      info.status = StepStatus::kNotConverged;
   } else {
     solve_explicit(options, info);
   }
@@ -309,13 +317,23 @@ ContactProblem ContactStage::explicit_problem() const {
   return p;
 }
 
-void ContactStage::solve_explicit(const StepSolverOptions& options, StepInfo& info) {
+size_t ContactStage::dense_size(int contacts) {
+  const size_t n = contacts;
+  return 9 * n * n + 7 * n + contact::ExplicitProblem::workspace_size(contacts);
+}
+
+contact::ExplicitProblem ContactStage::dense_problem(double* memory) const {
   const size_t n = count_;
-  double *g = dense_.data(), *c = g + 9 * n * n, *mu = c + 3 * n, *lambda = mu + n;
+  double *g = memory, *c = g + 9 * n * n, *mu = c + 3 * n, *lambda = mu + n;
   contact::write_out(problem_, g, c, mu, lambda);
-  contact::ExplicitProblem p{count_, g, c, mu, lambda, nullptr, nullptr};
+  contact::ExplicitProblem p{count_, g, c, mu, lambda};
   p.attach(lambda + 3 * n);
   contact::prepare(p);
+  return p;
+}
+
+void ContactStage::solve_explicit(const StepSolverOptions& options, StepInfo& info) {
+  contact::ExplicitProblem p = dense_problem(dense_.data());
   contact::SweepOptions o;
   o.max_dissipation = options.law == FrictionLaw::kMaxDissipation;
   o.method = contact::method_of(options.single_contact);
@@ -331,7 +349,23 @@ void ContactStage::solve_explicit(const StepSolverOptions& options, StepInfo& in
   info.newton_steps = 0;
   info.residual = contact::largest_residual(p, o.max_dissipation);
   if (!found.converged) info.status = StepStatus::kNotConverged;
-  contact::read_back(problem_, lambda, p.v);
+  contact::read_back(problem_, p.lambda, p.v);
+}
+
+bool ContactStage::solve_by_chain(double tolerance, StepInfo& info) {
+  if (count_ > solvers::kRobotSized) return false;
+  std::pmr::monotonic_buffer_resource memory(chain_memory_.get(), chain_bytes(count_));
+  solvers::Doubles numbers(dense_size(count_), &memory);
+  contact::ExplicitProblem p = dense_problem(numbers.data());
+  solvers::BestImpulse best(tolerance, false, nullptr, &memory);
+  solvers::Effort effort;
+  if (!best.offer(p, SolveStage::kStart)) solvers::run_brief_chain(p, best, effort, &memory);
+  info.newton_steps += effort.newton_steps + effort.interior_point_steps;
+  if (!best.solved()) return false;
+  best.restore(p);
+  info.residual = best.residual();
+  contact::read_back(problem_, p.lambda, p.v);
+  return true;
 }
 
 bool ContactStage::correct_overlap(Tree<double>& tree, double clearance, double tolerance) {

@@ -46,6 +46,8 @@ class ContactStage {
   void detect_reachable(const dynamics::Tree<double>& tree, double clearance,
                         const Vec3<double>& base_velocity, double h);
   int count() const { return count_; }
+  /// Numbers that a dense problem takes.
+  static size_t dense_size(int contacts);
   ActiveContact& active(int i) { return active_[i]; }
   const ActiveContact& active(int i) const { return active_[i]; }
   void forget() { count_ = 0; }
@@ -95,6 +97,11 @@ class ContactStage {
   /// Takes the points lower than `reach` above the ground.
   void detect_within(const dynamics::Tree<double>& tree, double clearance, double reach);
   void solve_explicit(const StepSolverOptions& options, StepInfo& info);
+  /// Where the factored solver ends above its tolerance [m/s]: the first stages of the chain of
+  /// `stickslip::solve` on the dense problem. True, with its answer in place, if that is solved.
+  bool solve_by_chain(double tolerance, StepInfo& info);
+  /// The factored problem as a dense one with its impulses, prepared, in `dense_size` numbers.
+  contact::ExplicitProblem dense_problem(double* memory) const;
 
   std::vector<collide::GroundShape> shapes_;
   std::vector<collide::PlacedShape> placed_;
@@ -110,6 +117,7 @@ class ContactStage {
   int num_shared_ = 0;
   std::vector<int> index_;
   std::unique_ptr<char, void (*)(char*)> memory_;
+  std::unique_ptr<char, void (*)(char*)> chain_memory_;
   contact::FactoredProblem<double> problem_;
   OverlapCorrection overlap_;
   std::vector<double> dense_;

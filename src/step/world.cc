@@ -29,9 +29,12 @@ void WorldOptions::validate() const {
     reject("max_substeps must be at least 1, got " + std::to_string(max_substeps));
   const StepSolverOptions& s = solver;
   solvers::check_settings("WorldOptions.solver", solvers::settings_of(s));
+  if (s.tolerance == 0) reject("WorldOptions.solver.tolerance is 0; it must be positive [m/s]");
   if (s.method != SolveMethod::kAuto && s.method != SolveMethod::kPerContact &&
       s.method != SolveMethod::kPgs)
-    reject("WorldOptions.solver.method: a step solves by kAuto, kPerContact or kPgs; use solve() for the others");
+    reject(
+        "WorldOptions.solver.method: a step solves by kAuto, kPerContact or kPgs; use solve() for "
+        "the others");
 }
 
 struct World::Impl {
