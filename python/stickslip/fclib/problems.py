@@ -19,9 +19,9 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip._arguments import array
+from stickslip._planar import planar_to_spatial, spatial_to_planar
 from stickslip.contact import ContactProblem, ContactSolution
 from stickslip.fclib.elimination import schur, symmetric
-from stickslip.fclib.order import planar_to_spatial, spatial_to_planar
 
 Array = NDArray[np.float64]
 
@@ -200,7 +200,7 @@ def _contact_problem(W: sp.csr_array, q: Array, mu: Array, spacedim: int) -> Con
     if spacedim == 2:
         W, q, mu = planar_to_spatial(W, q, mu)
     problem = ContactProblem(_delassus(W), q, mu)
-    problem._dimension = spacedim  # as `ContactProblem.planar` does, which is dense
+    problem._dimension = spacedim  # as `ContactProblem.planar` does
     return problem
 
 
