@@ -28,7 +28,10 @@ def planar_to_spatial(
     delassus: (2n, 2n) [1/kg], an array or a SciPy sparse matrix (then the result is a csr_array); free_velocity: (2n,) [m/s];
     friction: (n,); in the order x, z (normal) per contact. ValueError names the argument that does not fit.
     """
-    mu = np.asarray(friction, dtype=np.float64)
+    try:
+        mu = np.asarray(friction, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise type(error)(f"friction: not an array of numbers ({error})") from None
     if mu.ndim != 1:
         raise ValueError(f"friction has shape {mu.shape}; it must be (n,)")
     n = len(mu)

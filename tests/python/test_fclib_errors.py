@@ -415,6 +415,7 @@ def test_only_what_lies_in_the_plane_is_written_as_planar(tmp_path: Path) -> Non
         ({"free_velocity": np.zeros(6)}, r"free_velocity has shape \(6,\); it must be \(4,\) for 2 contacts"),
         ({"free_velocity": [0, 0, 0, np.inf]}, r"free_velocity\[3\] is inf"),
         ({"friction": 0.5}, r"friction has shape \(\); it must be \(n,\)"),
+        ({"friction": ["a", "b"]}, "friction: not an array of numbers"),
     ],
 )
 def test_arguments_of_planar_problems_that_do_not_fit_are_named(change: dict, says: str) -> None:
