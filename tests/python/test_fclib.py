@@ -145,6 +145,11 @@ def test_large_sparse_problems_load() -> None:
     problem = fclib.LocalProblem(blocks, np.ones(3 * n), np.full(n, 0.5)).to_contact_problem()
     assert problem.is_sparse
     np.testing.assert_array_equal(problem.dense_delassus(), blocks.toarray())
+    planar = sp.block_diag([delassus(2, k) for k in range(n)], format="csr")
+    problem = fclib.LocalProblem(planar, np.ones(2 * n), np.full(n, 0.5), spacedim=2).to_contact_problem()
+    assert problem.is_sparse and problem.dimension == 2
+    np.testing.assert_array_equal(problem.dense_delassus()[np.ix_([3, 5], [3, 5])], delassus(2, 1))
+    assert not problem.dense_delassus()[1::3].any()
     full = fclib.LocalProblem(delassus(303), np.ones(303), np.full(101, 0.5)).to_contact_problem()
     assert not full.is_sparse
 
