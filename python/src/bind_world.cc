@@ -54,15 +54,26 @@ void load_state(World& world, const nb::bytes& blob) {
   world.load_state({data, blob.size()});
 }
 
-/// (delassus (3n, 3n), free velocity (3n,), friction (n,)) of the next step.
-nb::tuple next_contact_problem(World& world, int robot) {
-  const ContactProblem problem = world.next_contact_problem(robot);
+/// (delassus (3n, 3n), free velocity (3n,), friction (n,)).
+nb::tuple arrays_of(const ContactProblem& problem) {
   const std::size_t rows = problem.free_velocity.size();
   const auto copy = [&](std::span<double> to) {
     std::copy(problem.delassus.begin(), problem.delassus.end(), to.begin());
   };
   return nb::make_tuple(make_array({rows, rows}, copy), copy_array(problem.free_velocity),
                         copy_array(problem.friction));
+}
+
+/// Delassus operator, free velocity and friction of the next step.
+nb::tuple next_contact_problem(World& world, int robot) {
+  return arrays_of(world.next_contact_problem(robot));
+}
+
+/// ((delassus, free velocity, friction), impulse (3n,)) of the last step.
+nb::tuple last_contact_problem(const World& world, int robot) {
+  std::vector<double> impulse;
+  const ContactProblem problem = world.last_contact_problem(robot, &impulse);
+  return nb::make_tuple(arrays_of(problem), copy_array(impulse));
 }
 
 ArrayOut delassus(const Robot& robot, const std::vector<int>& bodies,
@@ -238,6 +249,7 @@ void bind_world(nb::module_& m) {
       .def("save_state", &save_state)
       .def("load_state", &load_state, "blob"_a)
       .def("next_contact_problem", &next_contact_problem, "robot"_a)
+      .def("last_contact_problem", &last_contact_problem, "robot"_a)
       .def("set_profiling", &World::set_profiling, "on"_a)
       .def_prop_ro("stage_times", [](const World& w) { return w.stage_times(); })
       .def("reset_stage_times", &World::reset_stage_times);

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from stickslip import _core
 from stickslip._arguments import array, count, number
+from stickslip._planar import planar_to_spatial
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -63,19 +64,14 @@ class ContactProblem:
         )
 
     @classmethod
-    def planar(cls, delassus: ArrayLike, free_velocity: ArrayLike, friction: ArrayLike) -> ContactProblem:
+    def planar(
+        cls, delassus: ArrayLike | sparse.sparray, free_velocity: ArrayLike, friction: ArrayLike
+    ) -> ContactProblem:
         """A problem in the x-z plane, delassus (2n, 2n) [1/kg], free_velocity (2n,) [m/s], friction (n,); order x, z per contact.
 
         It is kept as a problem in space whose y rows are zero: impulses and velocities are (3n,) with y = 0.
         """
-        n = len(_numbers("friction", friction).reshape(-1))
-        G = _shaped("delassus", delassus, (2 * n, 2 * n), n)
-        c = _shaped("free_velocity", free_velocity, (2 * n,), n)
-        rows = (3 * np.arange(n)[:, None] + [0, 2]).reshape(-1)
-        spatial, velocity = np.zeros((3 * n, 3 * n)), np.zeros(3 * n)
-        spatial[np.ix_(rows, rows)] = G
-        velocity[rows] = c
-        problem = cls(spatial, velocity, friction)
+        problem = cls(*planar_to_spatial(delassus, free_velocity, friction))
         problem._dimension = 2
         return problem
 

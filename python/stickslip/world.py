@@ -411,8 +411,9 @@ class World:
     def record_contact_problems(self, path: str | os.PathLike[str] | None, every: int = 1) -> None:
         """From now on writes the contact problems of every `every`-th step that has contacts to FCLIB files; None stops it.
 
-        path: a folder (made if missing), or a pattern of file names with {step} (number of the step, from time 0), {robot},
-            {index}, {time} [s], as in "drop/{step:06d}_{robot}.hdf5". One file per robot; files that are there are replaced.
+        path: a folder (made if missing), or a pattern of file names with {number} (counts the recorded steps, on from the files
+            that are there, so that none is replaced), {robot}, {index}, {step} and {time} [s] of the world, as in
+            "drop/{number:06d}_{robot}.hdf5". One file per robot.
 
         The solver's impulse and velocity are the file's solution, texts say time, robot, law and residual. Steps have the same
         bits with and without recording. ValueError for a bad pattern or `every`; OSError from here or `step` where it cannot write.

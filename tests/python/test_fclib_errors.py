@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 import stickslip as ss
 from fclib_problems import global_problem, local_problem
@@ -276,6 +279,47 @@ def test_loading_does_not_look_at_solutions(tmp_path: Path) -> None:
     assert fclib.load(tmp_path / "a.hdf5").num_contacts == 4
 
 
+@pytest.mark.parametrize(
+    ("name", "kept"),
+    [("solution/r", (False, 2)), ("solution/v", (False, 2)), ("guesses/1/l", (True, 1)), ("guesses/2/u", (True, 1))],
+)
+def test_solutions_that_were_never_written_are_left_out_and_told(
+    tmp_path: Path, name: str, kept: tuple[bool, int]
+) -> None:
+    """Some programs make the data sets before they have something to put into them."""
+    path = tmp_path / "a.hdf5"
+    original = replace(
+        global_problem(constraints=2), guesses=[global_problem(constraints=2, seed=k).solution for k in (1, 2)]
+    )
+    fclib.write(path, original)
+    with h5py.File(path, "r+") as file:
+        claimed(name, file[name].shape, "f8")(file)
+    with pytest.warns(UserWarning) as caught:
+        problem = fclib.read(path)
+    assert [str(w.message) for w in caught] == [
+        f"{path}: {name} was never written, only made; this solution or guess is left out"
+    ]
+    assert caught[0].filename == __file__
+    assert (problem.solution is not None, len(problem.guesses)) == kept
+    if name == "guesses/1/l":
+        np.testing.assert_array_equal(problem.guesses[0].r, original.guesses[1].r)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert fclib.load(path).num_contacts == 3
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (claimed("solution/r", (10**12,), "f8"), "solution/r has 1000000000000 entries; 12 are expected"),
+        (claimed("guesses/1/u", (11,), "f8"), "guesses/1/u has 11 entries; 12 are expected"),
+        (claimed("solution/u", (12,), "i1", external="/dev/zero"), "solution/u has its values in other files"),
+    ],
+)
+def test_solutions_that_only_claim_are_held_against_the_problem(tmp_path: Path, change: Callable, says: str) -> None:
+    assert says in broken(tmp_path / "a.hdf5", change)
+
+
 # Errors of arguments
 
 
@@ -358,6 +402,24 @@ def test_only_what_lies_in_the_plane_is_written_as_planar(tmp_path: Path) -> Non
         fclib.save(tmp_path / "a.hdf5", ss.ContactProblem(np.diag([1.0, 0, 1]), [0, 2, 0], [0.5]), spacedim=2)
     with pytest.raises(ValueError, match="spacedim is 4"):
         fclib.save(tmp_path / "a.hdf5", ss.ContactProblem(np.eye(3), np.zeros(3), [0.5]), spacedim=4)
-    with pytest.raises(ValueError, match=r"W2 has shape \(3, 3\); it must be \(4, 4\)"):
-        fclib.planar_to_spatial(np.eye(3), np.zeros(4), [0.5, 0.5])
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"delassus": np.eye(3)}, r"delassus has shape \(3, 3\); it must be \(4, 4\) for 2 contacts in the plane"),
+        ({"delassus": sp.eye_array(6, format="csr")}, r"delassus has shape \(6, 6\); it must be \(4, 4\)"),
+        ({"delassus": [[1, 2], [3]]}, "delassus: not an array of numbers"),
+        ({"delassus": np.diag([1, 1, np.nan, 1])}, r"delassus\[2, 2\] is nan"),
+        ({"free_velocity": np.zeros(6)}, r"free_velocity has shape \(6,\); it must be \(4,\) for 2 contacts"),
+        ({"free_velocity": [0, 0, 0, np.inf]}, r"free_velocity\[3\] is inf"),
+        ({"friction": 0.5}, r"friction has shape \(\); it must be \(n,\)"),
+        ({"friction": ["a", "b"]}, "friction: not an array of numbers"),
+    ],
+)
+def test_arguments_of_planar_problems_that_do_not_fit_are_named(change: dict, says: str) -> None:
+    fields = {"delassus": np.eye(4), "free_velocity": np.zeros(4), "friction": [0.5, 0.5]}
+    fclib.planar_to_spatial(**fields)
+    with pytest.raises(ValueError, match=says):
+        fclib.planar_to_spatial(**(fields | change))

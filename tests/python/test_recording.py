@@ -57,7 +57,7 @@ def test_the_texts_say_what_was_recorded(tmp_path: Path) -> None:
     while not world.contacts:
         world.step()
     step = round(world.time / 2e-3) - 1
-    assert names(tmp_path) == [f"step{step:08d}_robot0_anymal_b.hdf5"]
+    assert names(tmp_path) == ["problem000000_robot0_anymal_b.hdf5"]
     recorded = fclib.read(tmp_path / names(tmp_path)[0])
     assert recorded.title.startswith(f"anymal_b, step {step}, t = 0.")
     for text in (
@@ -97,8 +97,10 @@ def test_every_counts_the_steps_that_have_contacts(tmp_path: Path) -> None:
         world.step()
         if first is None and robot.contacts:
             first = round(world.time * 1e3) - 1
-    steps = [int(name[4:12]) for name in names(tmp_path / "deep" / "er")]
-    assert steps == list(range(first, 90, 5))
+    files = names(tmp_path / "deep" / "er")
+    titles = [fclib.read(tmp_path / "deep" / "er" / name).title for name in files]
+    assert [int(title.split("step ")[1].split(",")[0]) for title in titles] == list(range(first, 90, 5))
+    assert files == [f"problem{k:06d}_robot0_anymal_b.hdf5" for k in range(len(files))]
 
 
 def test_steps_taken_at_once_are_recorded_one_by_one(tmp_path: Path) -> None:
@@ -127,21 +129,95 @@ def test_each_robot_gets_a_file_whatever_its_name(tmp_path: Path, ball: ss.Model
     world = two_balls(ball)
     world.record_contact_problems(tmp_path)
     world.step()
-    assert names(tmp_path) == ["step00000000_robot0_left.hdf5", "step00000000_robot1_a_b_c.hdf5"]
-    assert fclib.read(tmp_path / "step00000000_robot1_a_b_c.hdf5").title == "a/b c, step 0, t = 0 s"
+    assert names(tmp_path) == ["problem000000_robot0_left.hdf5", "problem000000_robot1_a_b_c.hdf5"]
+    assert fclib.read(tmp_path / "problem000000_robot1_a_b_c.hdf5").title == "a/b c, step 0, t = 0 s"
+
+
+def contents(folder: Path) -> dict[Path, bytes]:
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize(
+    "pattern", ["", "{number}.hdf5", "[a]/{robot}/{number:3d}.hdf5", "{time:.3f}/{number:02d}_{step}.hdf5"]
+)
+def test_recording_the_same_steps_again_replaces_no_file(tmp_path: Path, pattern: str) -> None:
+    world, _ = dropped_anymal()
+    world.step(100)
+    state = world.save_state()
+    before: dict[Path, bytes] = {}
+    for again in range(3):
+        world.load_state(state)
+        if again < 2:  # the last time it is the same recording that goes on
+            world.record_contact_problems(tmp_path / pattern)
+        world.step(6)
+        after = contents(tmp_path)
+        assert len(after) == len(before) + 6
+        assert {path: after[path] for path in before} == before
+        before = after
+
+
+def test_numbers_go_on_after_the_largest_that_is_there(tmp_path: Path, ball: ss.Model) -> None:
+    for name in ("problem000007_robot3_x.hdf5", "problem1_robot0_left.hdf5", "problem000099_robot0.hdf5", "notes9.txt"):
+        (tmp_path / name).write_text("")
+    world = two_balls(ball)
+    world.record_contact_problems(tmp_path)
+    world.step()
+    (tmp_path / "problem000009_robot1_a_b_c.hdf5").write_text("of somebody else")
+    world.step()
+    numbers = [name[:13] for name in names(tmp_path) if name.endswith("left.hdf5") and name > "problem000001"]
+    assert numbers == ["problem000008", "problem000010", "problem1_robo"]
+    assert (tmp_path / "problem000009_robot1_a_b_c.hdf5").read_text() == "of somebody else"
+
+
+@pytest.mark.parametrize("integrator", ["energy_safe", "semi_implicit"])
+def test_the_recorded_problem_is_the_one_that_moved_the_robot(tmp_path: Path, integrator: str) -> None:
+    world, robot = dropped_anymal(integrator=integrator, time_step=4e-3)
+    world.record_contact_problems(tmp_path)
+    substeps = []
+    for _ in range(30):
+        expected = robot.next_contact_problem()
+        world.step()
+        if not robot.contacts:
+            continue
+        recorded = fclib.load(tmp_path / f"problem{len(substeps):06d}_robot0_anymal_b.hdf5")
+        np.testing.assert_array_equal(recorded.dense_delassus(), expected.delassus)
+        np.testing.assert_array_equal(recorded.free_velocity, expected.free_velocity)
+        np.testing.assert_array_equal(recorded.friction, expected.friction)
+        substeps.append(robot.solve_info.substeps)
+        if len(substeps) == 5:
+            robot.set_state(
+                robot.q, np.concatenate([robot.u[:3], [0, 0, 100], robot.u[6:]])
+            )  # too fast for one substep
+    assert len(substeps) >= 6 and (max(substeps) > 1) == (integrator == "energy_safe")
+
+
+def test_a_recorded_step_is_computed_once(tmp_path: Path, ball: ss.Model) -> None:
+    calls = []
+
+    class Core:
+        def __getattr__(self, name: str) -> object:
+            calls.append(name)
+            return getattr(core, name)
+
+    world = two_balls(ball)
+    world.record_contact_problems(tmp_path)
+    core, world._core = world._core, Core()
+    world.step()
+    assert len(names(tmp_path)) == 2
+    assert calls.count("step") == 1 and "next_contact_problem" not in calls
 
 
 def test_a_pattern_names_files_and_folders(tmp_path: Path, ball: ss.Model) -> None:
     world = two_balls(ball)
-    world.record_contact_problems(tmp_path / "{robot}" / "{step:03d}_{time:.4f}.h5")
-    world.step(2)
+    world.record_contact_problems(tmp_path / "{robot}" / "{number:03d}_{step}_{time:.4f}.h5", every=2)
+    world.step(3)
     assert names(tmp_path) == ["a_b_c", "left"]
-    assert names(tmp_path / "left") == ["000_0.0000.h5", "001_0.0010.h5"]
+    assert names(tmp_path / "left") == ["000_0_0.0000.h5", "001_2_0.0020.h5"]
 
 
 def test_a_pattern_that_does_not_tell_robots_apart_is_refused(tmp_path: Path, ball: ss.Model) -> None:
     world = two_balls(ball)
-    world.record_contact_problems(tmp_path / "{step}.hdf5")
+    world.record_contact_problems(tmp_path / "{number}.hdf5")
     with pytest.raises(ValueError, match=r"0.hdf5: is the file of left and of a/b c .* put \{robot\} or \{index\}"):
         world.step()
 
@@ -149,11 +225,16 @@ def test_a_pattern_that_does_not_tell_robots_apart_is_refused(tmp_path: Path, ba
 @pytest.mark.parametrize(
     ("pattern", "says"),
     [
-        ("{robot}.hdf5", r"every step would overwrite the last; put \{step\} into it"),
-        ("{step}_{shape}.hdf5", r"unknown field 'shape'.*\{step\}, \{index\}, \{robot\}, \{time\}"),
-        ("{step", "path is .*pattern has the fields"),
-        ("step}", "path is .*pattern has the fields"),
-        ("{step:08q}", "path is .*pattern has the fields"),
+        ("{robot}_{step}.hdf5", r"files of different steps would have the same name; put \{number\} into it"),
+        (
+            "{number}_{shape}.hdf5",
+            r"unknown field 'shape'.*\{number\}, \{step\}, \{index\}, \{robot\}, \{time\}, as in",
+        ),
+        ("{number", "path is .*pattern has the fields"),
+        ("number}", "path is .*pattern has the fields"),
+        ("{number:08q}", "path is .*pattern has the fields"),
+        ("{number:.1e}", r"\{number:.1e\} is not a width, as in \{number:06d\}"),
+        ("{number:06d}_{number:x}", r"\{number:x\} is not a width"),
         ("{}", "path is .*pattern has the fields"),
         ("{step.nothing}", "path is .*pattern has the fields"),
     ],

@@ -6,7 +6,7 @@ Python is in the order x, y, z (normal) per contact; in a file the normal comes 
 
 from __future__ import annotations
 
-from stickslip.fclib.order import planar_to_spatial, spatial_to_planar
+from stickslip._planar import planar_to_spatial, spatial_to_planar
 from stickslip.fclib.problems import GlobalProblem, LocalProblem, Solution
 from stickslip.fclib.reading import load, read
 from stickslip.fclib.writing import save, write

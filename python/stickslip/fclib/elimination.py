@@ -10,7 +10,7 @@ from scipy.sparse.linalg import splu
 Array = NDArray[np.float64]
 
 ROUNDING = 1e-9  # of the largest entry: what ContactProblem takes for rounding too
-TEXT_ROUNDING = 1e-6  # digits that files lose when they have been text once
+FEW_DIGITS = 1e-2  # what is left of symmetry where a file was written in few digits
 _COLUMNS = 256  # right-hand sides at a time
 _ENTRIES = 1 << 25  # of a block of right-hand sides: 256 MB
 
@@ -18,7 +18,7 @@ _ENTRIES = 1 << 25  # of a block of right-hand sides: 256 MB
 def symmetric(matrix: sp.csr_array, name: str) -> tuple[sp.csr_array, str]:
     """(A + A') / 2, and a text that says how far A was from it, empty up to rounding.
 
-    ValueError beyond `TEXT_ROUNDING` of the largest entry.
+    ValueError beyond `FEW_DIGITS` of the largest entry.
     """
     half = 0.5 * matrix  # first, so that two entries near the largest double do not overflow
     apart = sp.coo_array(half - half.T)
@@ -32,8 +32,8 @@ def symmetric(matrix: sp.csr_array, name: str) -> tuple[sp.csr_array, str]:
         f"{name} is not symmetric: [{row}, {column}] and [{column}, {row}]{order} differ by {difference:.3g}, "
         f"{difference / largest:.2g} of the largest entry"
     )
-    if not difference <= TEXT_ROUNDING * largest:
-        raise ValueError(f"{says}; at most {TEXT_ROUNDING:g} is taken for rounding")
+    if not difference <= FEW_DIGITS * largest:
+        raise ValueError(f"{says}; at most {FEW_DIGITS:g} is mended")
     return sp.csr_array(half + half.T), says if difference > ROUNDING * largest else ""
 
 

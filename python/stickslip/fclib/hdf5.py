@@ -81,6 +81,12 @@ class Group:
             raise self.error(f"{child}[{bad[0]}]", f"is {values[bad[0]]}; it must be finite")
         return values
 
+    def reals_if_written(self, child: str, size: int, why: str) -> NDArray[np.float64] | None:
+        """As `reals`; None for a data set of that size to which nothing was ever written."""
+        dataset = self._dataset(child, "fiu", "real numbers")
+        self._check_size(child, dataset, size, why)
+        return None if self._unwritten(child, dataset) else self.reals(child, size, why)
+
     def text(self, child: str) -> str:
         """A single string."""
         dataset = self._dataset(child, "SO", "a text")
@@ -141,13 +147,17 @@ class Group:
         if size is not None and dataset.size != size:
             raise self.error(child, f"has {dataset.size} entries; {size} are expected ({why})")
 
+    def _unwritten(self, child: str, dataset: h5py.Dataset) -> bool:
+        """HDF5 gives room to a data set when something is written to it, and fill values to who reads it before."""
+        with self._reading(child):
+            return dataset.size > 0 and dataset.id.get_storage_size() == 0
+
     def _values(self, child: str, dataset: h5py.Dataset) -> NDArray:
         """Everything in a data set, native."""
         with self._reading(child):
             claimed = dataset.size * dataset.dtype.itemsize
             held = os.path.getsize(self._path)
-            stored = dataset.id.get_storage_size()
-        if claimed > _LARGEST_RATIO * held or (claimed and not stored):
+        if claimed > _LARGEST_RATIO * held or self._unwritten(child, dataset):
             raise self.error(child, f"claims {claimed} bytes, but was never written in full (the file has {held})")
         with self._reading(child):
             return np.asarray(dataset[()])

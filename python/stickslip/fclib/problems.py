@@ -19,9 +19,9 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip._arguments import array
+from stickslip._planar import spatial_to_planar
 from stickslip.contact import ContactProblem, ContactSolution
 from stickslip.fclib.elimination import schur, symmetric
-from stickslip.fclib.order import planar_to_spatial, spatial_to_planar
 
 Array = NDArray[np.float64]
 
@@ -197,19 +197,11 @@ def _without_constraints(problem: LocalProblem, W: sp.csr_array) -> tuple[sp.csr
 
 
 def _contact_problem(W: sp.csr_array, q: Array, mu: Array, spacedim: int) -> ContactProblem:
-    if spacedim == 2:
-        W, q, mu = planar_to_spatial(W, q, mu)
-    problem = ContactProblem(_delassus(W), q, mu)
-    problem._dimension = spacedim  # as `ContactProblem.planar` does, which is dense
-    return problem
-
-
-def _delassus(W: sp.csr_array) -> Any:
-    """In the form that is solved faster."""
-    rows = W.shape[0]
-    if rows > _SPARSE_ROWS and W.nnz < _SPARSE_DENSITY * rows**2:
-        return sp.bsr_array(W, blocksize=(3, 3))
-    return W.toarray()
+    """With W in the form that is solved faster."""
+    rows = 3 * len(mu)
+    keep_sparse = rows > _SPARSE_ROWS and W.nnz < _SPARSE_DENSITY * rows**2
+    make = ContactProblem.planar if spacedim == 2 else ContactProblem
+    return make(W if keep_sparse else W.toarray(), q, mu)
 
 
 # Checks

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from typing import Literal
 
 import numpy as np
@@ -23,17 +24,22 @@ def read(path: str | os.PathLike[str], form: Form | None = None) -> LocalProblem
     form: "local" or "global", for a file that holds both.
 
     FileNotFoundError, OSError for a file that cannot be read, ValueError for everything in it that is not as it should be; they name
-    the file and the group or data set.
+    the file and the group or data set. A solution or guess with a data set that was never written is left out; a UserWarning names it.
     """
-    return _read(path, form, solutions=True)
+    unwritten: list[str] = []
+    problem = _read(path, form, unwritten)
+    for says in unwritten:
+        warnings.warn(says, UserWarning, stacklevel=2)
+    return problem
 
 
 def load(path: str | os.PathLike[str], form: Form | None = None) -> ContactProblem:
     """The `ContactProblem` of an FCLIB file; its solution and guesses are not looked at. Errors: see `read`, `to_contact_problem`."""
-    return _read(path, form, solutions=False).to_contact_problem()
+    return _read(path, form, None).to_contact_problem()
 
 
-def _read(path: str | os.PathLike[str], form: Form | None, solutions: bool) -> LocalProblem | GlobalProblem:
+def _read(path: str | os.PathLike[str], form: Form | None, unwritten: list[str] | None) -> LocalProblem | GlobalProblem:
+    """Without solutions if `unwritten` is None; else it gets a text for each that is left out."""
     if form not in (None, "local", "global"):
         raise ValueError(f"form is {form!r}; it must be 'local', 'global' or None")
     name = path_of(path)
@@ -43,8 +49,8 @@ def _read(path: str | os.PathLike[str], form: Form | None, solutions: bool) -> L
         spacedim = _spacedim(main)
         fields = _local(main, spacedim) if found == "local" else _global(main, spacedim)
         fields |= _texts(main)
-        if solutions:
-            fields |= _solutions(root, fields, spacedim)
+        if unwritten is not None:
+            fields |= _solutions(root, fields, spacedim, unwritten)
     kind = LocalProblem if found == "local" else GlobalProblem
     return kind(spacedim=spacedim, source=name, **fields)
 
@@ -211,7 +217,7 @@ def _texts(main: Group) -> dict[str, str]:
     return {name: info.text(name) for name in ("title", "description", "math_info") if name in info}
 
 
-def _solutions(root: Group, fields: dict, spacedim: int) -> dict:
+def _solutions(root: Group, fields: dict, spacedim: int, unwritten: list[str]) -> dict:
     """`solution` and `guesses`, which lie beside the problem's group."""
     contacts = len(fields["mu"]) * spacedim
     sizes = {"u": contacts, "r": contacts}
@@ -223,23 +229,29 @@ def _solutions(root: Group, fields: dict, spacedim: int) -> dict:
     order = our_rows(contacts, spacedim)
     result: dict = {}
     if "solution" in root:
-        result["solution"] = _solution(root.group("solution"), sizes, order)
+        result["solution"] = _solution(root.group("solution"), sizes, order, unwritten)
     if "guesses" in root:
         guesses = root.group("guesses")
         number = guesses.integer("number_of_guesses")
         if number < 0:
             raise guesses.error("number_of_guesses", f"is {number}; it must be zero or positive")
         # One by one, so that a number that is only claimed ends at the first group that is missing.
-        result["guesses"] = [_solution(guesses.group(str(k + 1)), sizes, order) for k in range(number)]
+        found = (_solution(guesses.group(str(k + 1)), sizes, order, unwritten) for k in range(number))
+        result["guesses"] = [guess for guess in found if guess is not None]
     return result
 
 
-def _solution(group: Group, sizes: dict[str, int], order: NDArray[np.int64]) -> Solution:
+def _solution(group: Group, sizes: dict[str, int], order: NDArray[np.int64], unwritten: list[str]) -> Solution | None:
+    """None, with a text in `unwritten`, where a program made a data set and never filled it: its fill values are no solution."""
     values = {
-        name: group.reals(name, size, "as the problem has unknowns")
+        name: group.reals_if_written(name, size, "as the problem has unknowns")
         for name, size in sizes.items()
         if size or name in "ur"
     }
+    lost = [name for name, value in values.items() if value is None]
+    if lost:
+        unwritten.append(str(group.error(lost[0], "was never written, only made; this solution or guess is left out")))
+        return None
     for name in ("u", "r"):
         values[name] = _ours(values[name], order)
     return Solution(**values)

@@ -12,6 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
+from stickslip._planar import planar_rows
 from stickslip.contact import ContactProblem, ContactSolution
 from stickslip.fclib.hdf5 import path_of
 from stickslip.fclib.order import our_rows
@@ -96,12 +97,9 @@ def save(
     if solution is not None:
         stored = Solution.from_contact_solution(solution)
         if spacedim == 2:  # impulses along y do nothing there
-            stored = Solution(u=_planar(stored.u), r=_planar(stored.r))
+            rows = planar_rows(problem.num_contacts)
+            stored = Solution(u=stored.u[rows], r=stored.r[rows])
     write(path, local, storage=storage, title=title, description=description, math_info=math_info, solution=stored)
-
-
-def _planar(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(values).reshape(-1, 3)[:, [0, 2]].reshape(-1)
 
 
 def _write(file: h5py.File, problem: LocalProblem | GlobalProblem, storage: Storage) -> None:
