@@ -2,6 +2,7 @@
 # make test    all C++ and Python tests
 # make lint    formatting and kernel rules;  make format  mends the formatting
 # make bench   stickslip beside MuJoCo on the same tasks (BENCH="..." for its options)
+# make bench-contact   its contact solver beside those of Pinocchio and Siconos
 # make sanitize  C++ tests with address and undefined-behavior sanitizers
 #
 # Needs a C++20 compiler and Python >= 3.10 with venv; everything else comes into .venv with pip.
@@ -23,7 +24,7 @@ CXX_TESTS := $(shell find tests/cpp -type f 2>/dev/null)
 # One build folder serves the package and the C++ tests, so that nothing is compiled twice.
 INSTALL = $(BIN)/python -m pip install -q --no-build-isolation -C build-dir=$(BUILD)
 
-.PHONY: run test test-cpp test-python bench sanitize lint format clean
+.PHONY: run test test-cpp test-python bench bench-contact sanitize lint format clean
 .DELETE_ON_ERROR:
 MAKEFLAGS += --no-builtin-rules
 
@@ -73,6 +74,9 @@ $(VENV)/bench: $(VENV)/tools
 
 bench: $(VENV)/bench
 	$(BIN)/python benchmarks/compare/run.py $(BENCH)
+
+bench-contact: $(VENV)/bench
+	$(BIN)/python benchmarks/contact/run.py $(BENCH)
 
 # -O1: with checks in every unrolled kernel, -O2 takes minutes and gigabytes per file.
 # Without the longest runs of whole tasks: ten times slower here, and the trot runs the same code.

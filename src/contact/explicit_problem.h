@@ -177,6 +177,18 @@ inline double largest_residual(const ExplicitProblem& p, bool max_dissipation) {
   return worst;
 }
 
+/// The same over the contacts that can push: what a solver can do something about. A contact that
+/// is held along its normal and driven in must not decide which impulse is best for the others.
+inline double reachable_residual(const ExplicitProblem& p, bool max_dissipation) {
+  double worst = 0;
+  for (int i = 0; i < p.n; ++i) {
+    if (!(p.local[i].inv_zz > 0)) continue;
+    const double e = contact_residual(p, i, max_dissipation);
+    if (!(e <= worst)) worst = e == e ? e : __builtin_inf();
+  }
+  return worst;
+}
+
 /// What contact i violates of its law [m/s], (C26), without solving anything: the least of what it
 /// would violate as an open, a sticking and a sliding contact (impulses times `scale`). Zero
 /// exactly at a solution, under either law.
@@ -211,7 +223,7 @@ inline double violation_sum(const ExplicitProblem& p, bool max_dissipation) {
 
 /// What ends a sweep loop once it is at most the tolerance.
 enum class StopTest {
-  kResidual,      ///< the largest contact residual [m/s]: the project's certificate
+  kResidual,  ///< the largest residual of contacts that can push [m/s]: the project's certificate
   kViolationSum,  ///< the paper's test for per-contact iteration [m/s]
   kUpdateSum,     ///< the paper's test for PGS: impulse updates [N s] and penetration velocities
                   ///< [m/s], added
@@ -249,10 +261,11 @@ inline double stop_error(const ExplicitProblem& p, const SweepOptions& o, double
     // The residual costs a solve per contact; it is worth that only where the violations are small
     // already.
     double worst = 0;
-    for (int i = 0; i < p.n; ++i) worst = max(worst, contact_violation(p, i, true));
+    for (int i = 0; i < p.n; ++i)
+      if (p.local[i].inv_zz > 0) worst = max(worst, contact_violation(p, i, true));
     if (worst > o.tolerance) return worst;
   }
-  return largest_residual(p, o.max_dissipation);
+  return reachable_residual(p, o.max_dissipation);
 }
 
 /// Ends a sweep: true if the loop is done. Convergence counts only with velocities computed from

@@ -90,6 +90,7 @@ bool Admm::run(BestImpulse& best, int max_iterations) {
       double y[3];
       for (int r = 0; r < 3; ++r) y[r] = right[3 * i + r] - z_[3 * i + r] / weight;
       project_on_cone(p_.local[i].mu, y);
+      if (!(p_.local[i].inv_zz > 0)) y[0] = y[1] = y[2] = 0;
       for (int r = 0; r < 3; ++r) {
         const int at = 3 * i + r;
         const double x = right[at];

@@ -17,10 +17,16 @@ struct AlartCurnier {
 
 inline double squared(const double x[3]) { return x[0] * x[0] + x[1] * x[1] + x[2] * x[2]; }
 
+/// s; negative for a contact that cannot push, which takes no part.
+inline double push_of(const contact::LocalContact<double>& k, const double lambda[3],
+                      const double u[3]) {
+  return k.inv_zz > 0 ? k.scale * lambda[2] - u[2] : -1;
+}
+
 /// F alone.
 inline void alart_curnier_value(const contact::LocalContact<double>& k, const double lambda[3],
                                 const double u[3], double F[3]) {
-  const double s = k.scale * lambda[2] - u[2], limit = k.mu * max(s, 0.0);
+  const double s = push_of(k, lambda, u), limit = k.mu * max(s, 0.0);
   const double t0 = k.scale * lambda[0] - u[0], t1 = k.scale * lambda[1] - u[1];
   const double norm = sqrt(t0 * t0 + t1 * t1), f = norm > limit ? limit / norm : 1;
   F[0] = norm > limit ? k.scale * lambda[0] - f * t0 : u[0];
@@ -30,7 +36,7 @@ inline void alart_curnier_value(const contact::LocalContact<double>& k, const do
 
 inline void alart_curnier(const contact::LocalContact<double>& k, const double lambda[3],
                           const double u[3], AlartCurnier& c) {
-  const double s = k.scale * lambda[2] - u[2], limit = k.mu * max(s, 0.0);
+  const double s = push_of(k, lambda, u), limit = k.mu * max(s, 0.0);
   const double t0 = k.scale * lambda[0] - u[0], t1 = k.scale * lambda[1] - u[1];
   const double norm = sqrt(t0 * t0 + t1 * t1);
   alart_curnier_value(k, lambda, u, c.F);

@@ -31,7 +31,7 @@ class BestImpulse {
   bool offer(contact::ExplicitProblem& p, SolveStage stage, bool recorded = false) {
     project_on_cones(p);
     contact::refresh_velocity(p);
-    last_ = largest_residual(p, max_dissipation_);
+    last_ = reachable_residual(p, max_dissipation_);
     if (!(last_ < __builtin_inf())) last_ = __builtin_inf();
     if (!recorded) record(stage, last_);
     keep(p, stage, last_);

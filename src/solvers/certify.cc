@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lane/math.h"
+
 namespace stickslip::solvers {
 namespace {
 
@@ -31,9 +33,8 @@ double backward_error(const LocalContact<double>& k, const double v[3], const do
 
 /// Angle between lambda_T and -v_T [rad], of (C64); atan2 keeps small angles exact.
 double direction_angle(const double v[3], const double l[3]) {
-  const double speed = length2(v), t = length2(l);
   const double cross = l[0] * v[1] - l[1] * v[0], dot = -(l[0] * v[0] + l[1] * v[1]);
-  return std::atan2(std::fabs(cross), dot) * (speed > 0 && t > 0);
+  return atan2(std::fabs(cross), dot);
 }
 
 }  // namespace

@@ -108,7 +108,7 @@ class Chain {
       change = std::max(change, visit(p_, i, speed, directions_.data() + 2 * i));
     ++effort_.sweeps;
     change = std::sqrt(change);
-    if (best_.records()) best_.record(SolveStage::kSweeps, largest_residual(p_, false));
+    if (best_.records()) best_.record(SolveStage::kSweeps, reachable_residual(p_, false));
     return change;
   }
 

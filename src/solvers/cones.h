@@ -13,10 +13,11 @@ inline void project_on_cone(double mu, double* x) {
 }
 
 /// Brings every impulse into its cone: the normal part kept if it is not negative, the tangential
-/// part shortened.
+/// part shortened. A contact that cannot push gets none.
 inline void project_on_cones(contact::ExplicitProblem& p) {
   for (int i = 0; i < p.n; ++i) {
     double* l = p.lambda + 3 * i;
+    if (!(p.local[i].inv_zz > 0)) l[0] = l[1] = l[2] = 0;
     l[2] = max(l[2], 0.0);
     const double square = l[0] * l[0] + l[1] * l[1], limit = p.local[i].mu * l[2];
     if (square > limit * limit) {
@@ -32,7 +33,7 @@ inline void project_on_cones(contact::ExplicitProblem& p) {
 inline void settle_on_cones(contact::ExplicitProblem& p) {
   for (int i = 0; i < p.n; ++i) {
     const contact::LocalContact<double>& k = p.local[i];
-    if (!(k.scale > 0)) continue;
+    if (!(k.inv_zz > 0)) continue;
     const double* v = p.v + 3 * i;
     double *l = p.lambda + 3 * i, x[3];
     for (int r = 0; r < 3; ++r) x[r] = k.scale * l[r] - v[r];

@@ -125,14 +125,18 @@ bool ProxNewton::subproblem(double alpha, double start_residual, double toleranc
 /// The weights of (C38).
 bool ProxNewton::run(BestImpulse& best, double alpha, int max_steps) {
   const int last = steps_ + max_steps;
+  // A sliding velocity counts mu times in the residual, once in the merit.
+  double most_friction = 0;
+  for (int i = 0; i < p_.n; ++i) most_friction = std::max(most_friction, p_.local[i].mu);
+  const double tolerance = best.tolerance() / (1 + most_friction);
   project_on_cones(p_);
   contact::refresh_velocity(p_);
-  double residual = contact::largest_residual(p_, false);
+  double residual = contact::reachable_residual(p_, false);
   int failures = 0;
   while (!best.solved() && steps_ < last && alpha <= kLargestAlpha) {
     std::copy(p_.lambda, p_.lambda + 3 * p_.n, center_);
     const int before = steps_;
-    const bool solved = subproblem(alpha, residual, best.tolerance(), last - steps_);
+    const bool solved = subproblem(alpha, residual, tolerance, last - steps_);
     if (best.offer(p_, SolveStage::kProxNewton)) return true;
     const double reached = best.last_residual();
     if (solved && reached < 3 * residual) {

@@ -61,7 +61,7 @@ void run_sweeps(ExplicitProblem& p, const SolveOptions& o, BestImpulse& best, Ef
     s.history = &record;
     s.record = [](void* to, double error) {
       auto& [problem, b, by_residual] = *static_cast<Record*>(to);
-      const double r = by_residual ? error : largest_residual(problem, b.max_dissipation());
+      const double r = by_residual ? error : reachable_residual(problem, b.max_dissipation());
       if (by_residual) b.keep(problem, SolveStage::kSweeps, r);
       b.record(SolveStage::kSweeps, r);
     };
@@ -123,7 +123,7 @@ bool improve(ExplicitProblem& p, double allowed, F&& change) {
   const std::vector<double> kept(p.lambda, p.lambda + 3 * p.n);
   change();
   contact::refresh_velocity(p);
-  if (largest_residual(p, false) <= allowed) return true;
+  if (reachable_residual(p, false) <= allowed) return true;
   std::copy(kept.begin(), kept.end(), p.lambda);
   contact::refresh_velocity(p);
   return false;

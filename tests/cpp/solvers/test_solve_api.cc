@@ -266,7 +266,8 @@ TEST(AWarmStartAtTheSolutionStaysThere) {
   o.method = SolveMethod::kPerContact;
   const SolveResult a = solve(p, o), b = solve(p, o, a.impulse);
   CHECK(a.sweeps > 1 && b.sweeps == 0 && b.stage == SolveStage::kStart);
-  CHECK(b.status == SolveStatus::kConverged && b.impulse == a.impulse);
+  CHECK(b.status == SolveStatus::kConverged);
+  for (std::size_t i = 0; i < a.impulse.size(); ++i) CHECK_NEAR(b.impulse[i], a.impulse[i], 1e-15);
 }
 
 TEST(SolveContactAgreesWithSolve) {

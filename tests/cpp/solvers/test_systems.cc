@@ -92,7 +92,7 @@ TEST(TheMapsDerivativeIsThatOfDifferences) {
   int modes[3] = {};
   for (int i = 0; i < 3000; ++i) {
     contact::LocalContact<double> k{};
-    k.scale = rng.uniform(0.1, 3), k.mu = rng.uniform(0.1, 2);
+    k.scale = rng.uniform(0.1, 3), k.mu = rng.uniform(0.1, 2), k.inv_zz = 1;
     double lambda[3], u[3], dl[3], du[3], moved[2][3][3], F[2][3];
     for (int r = 0; r < 3; ++r)
       lambda[r] = rng.normal(), u[r] = rng.normal(), dl[r] = rng.normal(), du[r] = rng.normal();
