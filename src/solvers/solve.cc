@@ -136,8 +136,8 @@ Certificate settled_certificate(ExplicitProblem& p, const SolveOptions& o, doubl
   Certificate c = solvers::certify(p, is_max_dissipation(o.law));
   if (is_max_dissipation(o.law) || c.backward_error <= 2 * std::max(tolerance, c.residual))
     return c;
-  const double allowed = std::max(tolerance, c.residual);
-  if (improve(p, allowed, [&] { solvers::settle_on_cones(p); })) c = solvers::certify(p, false);
+  if (improve(p, std::max(tolerance, c.residual), [&] { solvers::settle_on_cones(p); }))
+    c = solvers::certify(p, false);
   return c;
 }
 
@@ -169,7 +169,9 @@ SolveResult solve(const ContactProblem& problem, const SolveOptions& options,
     improve(e.view, std::max(tolerance, best.residual()), [&] {
       solvers::minimize_tangential_impulses(e.view, std::max(tolerance, 10 * best.residual()));
     });
-  r.certificate = settled_certificate(e.view, options, tolerance);
+  r.certificate = best.stage() == SolveStage::kStart
+                      ? solvers::certify(e.view, max_dissipation)
+                      : settled_certificate(e.view, options, tolerance);
   r.velocity.assign(e.view.v, e.view.v + 3 * n);
   r.impulse.assign(e.view.lambda, e.view.lambda + 3 * n);
   r.stage = best.stage();
