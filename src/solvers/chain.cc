@@ -64,7 +64,8 @@ class Chain {
     if (proximal_newton(best_.impulse(), 1e-3, 60)) return;
     for (const ShiftRule shift : {ShiftRule::kExact, ShiftRule::kLagged, ShiftRule::kDamped})
       if (interior_point(shift)) return;
-    if (admm(2000)) return;
+    // An iteration costs in proportion to the size; the whole stage no more than a few seconds.
+    if (admm(p_.n <= kRobotSized ? 2000 : std::min(20000, 6000000 / p_.n))) return;
     for (const double alpha : {1e-1, 1e-5, 1e-2}) {
       if (stubborn_sweeps(alpha < 1e-3 ? 1 : 0.7)) return;
       if (proximal_newton(best_.impulse(), alpha, 150)) return;
