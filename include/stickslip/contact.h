@@ -142,10 +142,10 @@ struct Certificate {
   std::vector<double> residuals;        ///< (n) residual of each contact [m/s], see `residual`
   std::vector<double> backward_errors;  ///< (n) the least change of the contact's velocity that
                                         ///< makes its impulse exact under Coulomb's law [m/s]
-  double residual = 0;           ///< the largest [m/s]
-  double backward_error = 0;     ///< the largest [m/s]
-  double penetration_speed = 0;  ///< the largest -v_z, or 0 [m/s]
-  double cone_violation = 0;     ///< the largest |lambda_T| - mu lambda_z, or 0 [N s]
+  double residual = 0;                  ///< the largest [m/s]
+  double backward_error = 0;            ///< the largest [m/s]
+  double penetration_speed = 0;         ///< the largest -v_z, or 0 [m/s]
+  double cone_violation = 0;            ///< the largest |lambda_T| - mu lambda_z, or 0 [N s]
   /// The largest angle between the friction of a sliding contact and the direction against its
   /// sliding [rad]; contacts slower than 1e-6 of the largest |c|, or that hardly push, do not
   /// count.

@@ -132,12 +132,16 @@ class Certificate:
     """How good an impulse is, from the problem and the impulse alone. Velocities are v = G impulse + c."""
 
     residuals: Array  #: (n,) residual of each contact [m/s], see `residual`
-    backward_errors: Array  #: (n,) least change of the contact's velocity that makes its impulse exact (Coulomb's law) [m/s]
+    backward_errors: (
+        Array  #: (n,) least change of a contact's velocity that makes its impulse exact, Coulomb's law [m/s]
+    )
     residual: float  #: the largest [m/s]
     backward_error: float  #: the largest [m/s]
     penetration_speed: float  #: the largest -v_z, or 0 [m/s]
     cone_violation: float  #: the largest |impulse_T| - mu impulse_z, or 0 [N s]
-    direction_error: float  #: largest angle between the friction of a sliding contact and the direction against its sliding [rad]
+    direction_error: (
+        float  #: largest angle between a sliding contact's friction and the direction against its sliding [rad]
+    )
     power: float  #: the largest |impulse . (v + mu |v_T| z)|, zero at a solution [J]
 
 

@@ -26,7 +26,9 @@ void BlockSystem::assemble_dense(const contact::ExplicitProblem& p, const Intege
     const auto multiply = [&](int first, int count, const double* from, int apart) {
       for (int r = 0; r < 3; ++r) {
         double* __restrict__ to = row + long(r) * stride + first;
-        const double* __restrict__ g0 = from, * __restrict__ g1 = from + apart, * __restrict__ g2 = g1 + apart;
+        const double* __restrict__ g0 = from;
+        const double* __restrict__ g1 = g0 + apart;
+        const double* __restrict__ g2 = g1 + apart;
         const double b0 = b[3 * r], b1 = b[3 * r + 1], b2 = b[3 * r + 2];
         for (int k = 0; k < count; ++k) to[k] = madd(b0, g0[k], madd(b1, g1[k], b2 * g2[k]));
       }
