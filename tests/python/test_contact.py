@@ -4,6 +4,7 @@ import hypothesis
 import numpy as np
 import pytest
 from hypothesis import strategies as st
+from scipy import sparse
 
 import stickslip as ss
 from stickslip.contact import _time_single_contact
@@ -218,3 +219,77 @@ def test_methods_are_timed_on_given_contacts():
     for ns, evaluations, failures in times.values():
         assert 0 < ns < 1e6 and evaluations >= 1 and 0 <= failures <= 1
     assert times["halley"][2] == times["bisection"][2] == 0
+
+
+def test_a_block_in_the_plane_sticks_or_slides_by_its_closed_form():
+    """m = 2 kg pressed down at 1 m/s and along x at u: sticks up to u = mu, beyond keeps u - mu."""
+    for u, mu, kept in ((0.3, 0.5, 0.0), (0.8, 0.5, 0.3), (-0.8, 0.5, -0.3), (0.8, 0.0, 0.8)):
+        p = ss.ContactProblem.planar(np.eye(2) / 2, [u, -1], [mu])
+        assert p.dimension == 2 and p.num_contacts == 1
+        for method in ss.contact.SOLVE_METHODS:
+            s = ss.solve(p, method=method, tolerance=1e-6)
+            assert s.converged, (method, u, mu)
+            np.testing.assert_allclose(s.velocity, [kept, 0, 0], atol=1e-5)
+            np.testing.assert_allclose(s.impulse, [2 * (kept - u), 0, 2], atol=1e-4)
+
+
+def test_sparse_problems_are_kept_in_blocks_and_solved_like_dense_ones():
+    p = random_problem(4, 5)
+    rng = np.random.default_rng(0)
+    order = rng.permutation(12 * 12)
+    rows, columns = np.divmod(order, 12)
+    shuffled = sparse.coo_array((p.delassus[rows, columns], (rows, columns)), shape=(12, 12))
+    for form in (
+        sparse.csr_matrix(p.delassus),
+        sparse.csc_array(p.delassus),
+        sparse.bsr_array(p.delassus, blocksize=(2, 2)),
+        shuffled,
+    ):
+        q = ss.ContactProblem(form, p.free_velocity, p.friction)
+        assert q.is_sparse and q.delassus.blocksize == (3, 3) and not p.is_sparse
+        np.testing.assert_array_equal(q.dense_delassus(), p.delassus)
+        np.testing.assert_allclose(ss.solve(q).velocity, ss.solve(p).velocity, atol=1e-8)
+        with pytest.raises(ValueError):
+            q.delassus.data[0, 0, 0] = 1
+    # Contacts that couple with nobody, one of them with nothing: its diagonal block is stored all the same.
+    q = ss.ContactProblem(sparse.csr_array(np.diag([1.0, 1, 1, 0, 0, 0])), [0.1, 0, -1, 0, 0, 1], [0.5, 0.5])
+    assert q.delassus.nnz == 18 and ss.solve(q).converged
+
+
+def test_bad_sparse_problems_raise_with_the_place():
+    good = sparse.csr_array(random_problem(2).delassus)
+    c, mu = np.zeros(6), [0.5, 0.5]
+    skewed, negative, broken = good.toarray(), good.toarray(), good.toarray()
+    skewed[0, 4] += 1
+    negative[4, 4] = -2
+    broken[1, 2] = np.nan
+    for matrix, text in [
+        (sparse.csr_array((5, 6)), r"delassus has shape \(5, 6\); it must be \(6, 6\) for 2 contacts"),
+        (sparse.csr_array(skewed), r"not symmetric: \[0, 4\] and \[4, 0\] differ by 1 "),
+        (sparse.csr_array(negative), r"delassus\[4, 4\] is -2"),
+        (sparse.csr_array(broken), r"delassus\[1, 2\] is nan"),
+        (sparse.csr_array(np.diag([1.0, 1, 1, 1, 1, 1]) + 2 * np.eye(6, k=3) + 2 * np.eye(6, k=-3)), "indefinite"),
+    ]:
+        with pytest.raises(ValueError, match=text):
+            ss.ContactProblem(matrix, c, mu)
+
+
+def test_a_certificate_says_what_is_wrong_with_an_impulse():
+    p = ss.ContactProblem(np.eye(3), [-2.0, 0.3, -0.6], [0.5])
+    c = ss.certify(p, [0.5, 0, 1])  # v = (-1.5, 0.3, 0.4), friction along x at its limit
+    assert c.residual == c.residuals[0] == ss.residual(p, [0.5, 0, 1])[0]
+    assert c.backward_error == pytest.approx(0.5) and c.backward_errors.shape == (1,)
+    assert c.direction_error == pytest.approx(np.arctan2(0.3, 1.5))
+    assert c.penetration_speed == 0 and c.cone_violation == 0
+    assert c.power == pytest.approx(abs(-0.75 + 0.4 + 0.5 * np.hypot(1.5, 0.3)))
+    with pytest.raises(ValueError, match=r"impulse has shape \(2,\)"):
+        ss.certify(p, [1, 2])
+
+
+def test_redundant_contacts_may_ask_for_the_least_tangential_impulses():
+    p = ss.problems.duplicated_contacts(seed=4)
+    a, b = ss.solve(p), ss.solve(p, minimum_norm=True)
+    tangential = [np.delete(s.impulse, np.s_[2::3]) for s in (a, b)]
+    assert np.linalg.norm(tangential[1]) <= np.linalg.norm(tangential[0]) * (1 + 1e-12)
+    assert b.converged
+    np.testing.assert_allclose(a.velocity, b.velocity, atol=1e-7)
