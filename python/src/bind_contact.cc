@@ -8,6 +8,7 @@
 #include "bindings.h"
 #include "contact/method_of.h"
 #include "scenes/time_methods.h"
+#include "solvers/solve.h"
 #include "words.h"
 
 namespace nb = nanobind;
@@ -119,13 +120,13 @@ class CheckedProblem {
     SolveResult r;
     {
       nb::gil_scoped_release free_interpreter;
-      r = stickslip::solve(problem_, o, start);
+      r = solvers::solve_checked(problem_, o, start);
     }
     return dict_of(r);
   }
   nb::dict certify(const VectorIn& impulse, const std::string& law) const {
     return dict_of(
-        stickslip::certify(problem_, vector_of(impulse), choice("law", law, kFrictionLaws)));
+        solvers::certify_checked(problem_, vector_of(impulse), choice("law", law, kFrictionLaws)));
   }
 
  private:

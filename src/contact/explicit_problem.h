@@ -96,11 +96,13 @@ inline void refresh_velocity(ExplicitProblem& p) {
 inline void prepare(ExplicitProblem& p) {
   for (int i = 0; i < p.n; ++i) {
     LocalContact<double>& k = p.local[i];
-    const double *x = p.row(3 * i) + 3 * i, *y = x + 3 * p.n, *z = y + 3 * p.n;
-    if (p.starts)
-      for_each_block(p, i, [&](int j, const double* g, int) {
-        if (j == i) x = g, y = g + 3, z = g + 6;
-      });
+    const double *x = nullptr, *y = nullptr, *z = nullptr;
+    if (p.starts) {
+      for (int b = p.starts[i]; b < p.starts[i + 1]; ++b)
+        if (p.columns[b] == i) x = p.G + 9L * b, y = x + 3, z = y + 3;
+    } else {
+      x = p.row(3 * i) + 3 * i, y = x + 3 * p.n, z = y + 3 * p.n;
+    }
     k.xx = x[0], k.xy = x[1], k.xz = x[2], k.yy = y[1], k.yz = y[2], k.zz = z[2];
     k.mu = min(p.mu[i], kMaxFriction);
     prepare(k);

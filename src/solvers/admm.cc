@@ -12,6 +12,8 @@ constexpr double kTau = 0.5;   // share of rho that enters
 constexpr double kRatio = 10;  // primal to dual residual at which rho changes
 constexpr double kStart = 16;  // rho = 16 sqrt(L eta) at first, L the largest eigenvalue
 constexpr double kGrowth = 2;  // of rho, or shrinking, where the residuals are out of balance
+constexpr double kLargestChange = 1e10;  // of rho in all
+constexpr int kSettle = 2;               // iterations between two changes: each costs factors
 constexpr int kOfferEvery = 5;
 
 }  // namespace
@@ -42,24 +44,34 @@ bool Admm::factor(double rho) {
   return system_.factor(p_, all_, A_.data(), B_.data());
 }
 
+/// out = G x / unit
+void Admm::multiply(const Doubles& x, Doubles& out) const {
+  for (int i = 0; i < p_.n; ++i) {
+    double sum[3] = {};
+    contact::for_each_block(p_, i, [&](int j, const double* g, int stride) {
+      for (int r = 0; r < 3; ++r)
+        for (int s = 0; s < 3; ++s) sum[r] = madd(g[r * stride + s] / unit_, x[3 * j + s], sum[r]);
+    });
+    for (int r = 0; r < 3; ++r) out[3 * i + r] = sum[r];
+  }
+}
+
 /// Of G / unit, by a few power steps from a fixed start: a tenth is precise enough for rho.
 double Admm::largest_eigenvalue() {
   const int m = 3 * p_.n;
-  const std::vector<double> kept(p_.lambda, p_.lambda + m);
   for (int r = 0; r < m; ++r) x_[r] = 1 + 0.1 * (r % 7);
-  double length = std::sqrt(double(m)), growth = 0;
-  for (int k = 0; k < 12 && length > 0; ++k) {
-    // Impulses in their own unit, so that the unit of mass does not show in the rounding.
-    for (int r = 0; r < m; ++r) p_.lambda[r] = x_[r] / (length * unit_);
-    contact::refresh_velocity(p_);
+  double growth = 0;
+  for (int k = 0; k < 12; ++k) {
     double square = 0;
-    for (int r = 0; r < m; ++r) {
-      x_[r] = p_.v[r] - p_.c[r];
-      square += x_[r] * x_[r];
-    }
-    growth = length = std::sqrt(square);
+    for (double x : x_) square += x * x;
+    if (!(square > 0)) break;
+    for (double& x : x_) x /= std::sqrt(square);
+    multiply(x_, y_);
+    x_.swap(y_);
+    growth = 0;
+    for (double x : x_) growth += x * x;
+    growth = std::sqrt(growth);
   }
-  std::copy(kept.begin(), kept.end(), p_.lambda);
   return std::max(growth, 1e-3);
 }
 
@@ -67,12 +79,14 @@ double Admm::largest_eigenvalue() {
 bool Admm::run(BestImpulse& best, int max_iterations) {
   const int m = 3 * p_.n;
   if (m == 0) return best.solved();
-  double rho = kStart * std::sqrt(largest_eigenvalue() * kEta);
+  const double first = kStart * std::sqrt(largest_eigenvalue() * kEta);
+  double rho = first;
   if (!factor(rho)) return false;
   contact::refresh_velocity(p_);
   std::copy(p_.lambda, p_.lambda + m, y_.begin());
   x_ = y_;
   for (int r = 0; r < m; ++r) z_[r] = p_.v[r] / unit_;
+  int changed = -kSettle;  // iteration of the last change of rho
   for (int k = 0; k < max_iterations; ++k) {
     ++iterations_;
     const double weight = kTau * rho;
@@ -101,14 +115,17 @@ bool Admm::run(BestImpulse& best, int max_iterations) {
         y_[at] = y[r];
       }
     }
-    if (k < kOfferEvery || k % kOfferEvery == 0 || k + 1 == max_iterations) {
+    if (best.records() || k < kOfferEvery || k % kOfferEvery == 0 || k + 1 == max_iterations) {
       std::copy(y_.begin(), y_.end(), p_.lambda);
       if (best.offer(p_, SolveStage::kAdmm)) return true;
       if (!std::isfinite(primal + dual)) return false;
     }
     const bool grow = primal > kRatio * dual, shrink = dual > kRatio * primal;
-    if (!grow && !shrink) continue;
-    rho *= grow ? kGrowth : 1 / kGrowth;
+    if (!(grow || shrink) || k - changed < kSettle) continue;
+    const double next = rho * (grow ? kGrowth : 1 / kGrowth);
+    if (!(next <= first * kLargestChange && next * kLargestChange >= first)) continue;
+    rho = next;
+    changed = k;
     if (!factor(rho)) return false;
   }
   return best.solved();

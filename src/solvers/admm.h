@@ -1,10 +1,11 @@
-// Alternating direction method of multipliers with De Saxce's shift (docs/theory/solvers.md
-// (C50)-(C52)), [Carpentier 2024]:
+// Alternating direction method of multipliers with De Saxce's shift (docs/theory/solvers.md (C50)
+// to (C52)), [Carpentier 2024]: with w = tau rho,
 //
-//   x <- argmin 1/2 x^T G x + (c + shift) x + eta/2 |x - x_old|^2 + rho/2 |x - y - z/rho|^2,
-//   y <- P_K(x - z / rho),   z <- z - rho (x - y),   shift_i = mu |z_T|;   z tends to v + shift
-// with a spectral rule for rho. Coulomb's law. A method of the field to compare with, and a start
-// for Newton steps where nothing else has helped.
+//   x <- argmin 1/2 x^T G x + (c + shift) . x + eta/2 |x - x_old|^2 + w/2 |x - y - z/w|^2,
+//   y <- P_K(x - z / w),   z <- z - w (x - y),   shift_i = mu |z_T|;   z tends to v + shift
+// rho starts from the largest eigenvalue and doubles or halves where the residuals are out of
+// balance. Coulomb's law. A method of the field to compare with, and a start for Newton steps where
+// nothing else has helped.
 #pragma once
 #include "solvers/best_impulse.h"
 #include "solvers/block_system.h"
@@ -21,6 +22,7 @@ class Admm {
 
  private:
   bool factor(double rho);
+  void multiply(const Doubles& x, Doubles& out) const;
   double largest_eigenvalue();
 
   contact::ExplicitProblem& p_;

@@ -39,7 +39,8 @@ class BestImpulse {
   }
   /// The same for an impulse in its cones whose residual is known.
   void keep(const contact::ExplicitProblem& p, SolveStage stage, double residual) {
-    if (!(residual < residual_ || impulse_.empty())) return;
+    if (!(residual < residual_ || !has_one_)) return;
+    has_one_ = true;
     residual_ = residual;
     stage_ = stage;
     if (residual < __builtin_inf())
@@ -52,13 +53,27 @@ class BestImpulse {
     for (int i = 0; i < 3 * p.n; ++i) p.lambda[i] = impulse_[i];
     contact::refresh_velocity(p);
   }
+  /// Records the residual of p.lambda brought into its cones; leaves the problem as it is.
+  void record_projected(contact::ExplicitProblem& p, SolveStage stage) {
+    const std::vector<double> impulse(p.lambda, p.lambda + 3 * p.n), v(p.v, p.v + 3 * p.n);
+    project_on_cones(p);
+    contact::refresh_velocity(p);
+    record(stage, reachable_residual(p, max_dissipation_));
+    for (int r = 0; r < 3 * p.n; ++r) p.lambda[r] = impulse[r], p.v[r] = v[r];
+  }
+  /// Takes p.lambda whatever it is worth: the answers of islands, none of which is worse than what
+  /// it replaces.
+  void replace(contact::ExplicitProblem& p, SolveStage stage) {
+    residual_ = __builtin_inf();
+    offer(p, stage);
+  }
   void record(SolveStage stage, double residual) {
     if (!history_) return;
     const std::chrono::duration<double> time = Clock::now() - start_;
     history_->push_back({stage, time.count(), residual});
   }
 
-  bool solved() const { return residual_ <= tolerance_; }
+  bool solved() const { return has_one_ && residual_ <= tolerance_; }
   double tolerance() const { return tolerance_; }
   double residual() const { return residual_; }
   double last_residual() const { return last_; }
@@ -70,7 +85,7 @@ class BestImpulse {
  private:
   using Clock = std::chrono::steady_clock;
   double tolerance_, residual_ = __builtin_inf(), last_ = __builtin_inf();
-  bool max_dissipation_;
+  bool max_dissipation_, has_one_ = false;
   SolveStage stage_ = SolveStage::kStart;
   Doubles impulse_;
   std::vector<HistoryEntry>* history_;

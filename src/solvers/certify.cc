@@ -31,6 +31,9 @@ double backward_error(const LocalContact<double>& k, const double v[3], const do
   return std::sqrt(x * x + y * y + v[2] * v[2]) + outside;
 }
 
+/// The larger; what is not a number counts as infinite.
+double worse(double a, double b) { return b <= a ? a : b == b ? b : INFINITY; }
+
 /// Angle between lambda_T and -v_T [rad], of (C64); atan2 keeps small angles exact.
 double direction_angle(const double v[3], const double l[3]) {
   const double cross = l[0] * v[1] - l[1] * v[0], dot = -(l[0] * v[0] + l[1] * v[1]);
@@ -50,16 +53,16 @@ Certificate certify(const contact::ExplicitProblem& p, bool max_dissipation) {
     const LocalContact<double>& k = p.local[i];
     const double *v = p.v + 3 * i, *l = p.lambda + 3 * i;
     const double e = contact_residual(p, i, max_dissipation), speed = length2(v);
-    out.residuals[i] = e;
-    out.backward_errors[i] = backward_error(k, v, l);
-    out.residual = std::max(out.residual, e);
-    out.backward_error = std::max(out.backward_error, out.backward_errors[i]);
-    out.penetration_speed = std::max(out.penetration_speed, -v[2]);
-    out.cone_violation = std::max(out.cone_violation, length2(l) - k.mu * l[2]);
+    out.residuals[i] = worse(0, e);
+    out.backward_errors[i] = worse(0, backward_error(k, v, l));
+    out.residual = worse(out.residual, e);
+    out.backward_error = worse(out.backward_error, out.backward_errors[i]);
+    out.penetration_speed = worse(out.penetration_speed, -v[2]);
+    out.cone_violation = worse(out.cone_violation, length2(l) - k.mu * l[2]);
     if (speed > kSlides * fastest && k.scale * length2(l) > kSlides * fastest)
-      out.direction_error = std::max(out.direction_error, direction_angle(v, l));
+      out.direction_error = worse(out.direction_error, direction_angle(v, l));
     out.power =
-        std::max(out.power, std::fabs(l[0] * v[0] + l[1] * v[1] + l[2] * (v[2] + k.mu * speed)));
+        worse(out.power, std::fabs(l[0] * v[0] + l[1] * v[1] + l[2] * (v[2] + k.mu * speed)));
   }
   return out;
 }

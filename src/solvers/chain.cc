@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "contact/per_contact.h"
 #include "solvers/admm.h"
 #include "solvers/interior_point.h"
 #include "solvers/islands.h"
 #include "solvers/prox_newton.h"
+#include "solvers/recorded_sweeps.h"
 
 namespace stickslip::solvers {
 namespace {
@@ -55,49 +55,77 @@ class Chain {
 
   void run_brief() {
     if (proximal_newton(best_.impulse(), 1e-3, 60)) return;
-    interior_point(ShiftRule::kExact);
+    interior_point(ShiftRule::kExact, 80);
   }
   void run() {
     if (p_.n <= kRobotSized ? sweeps_with_newton() : patient_sweeps()) return;
     // What is left is hyperstatic, ill-conditioned or large.
     if (separate_islands()) return;
-    if (proximal_newton(best_.impulse(), 1e-3, 60)) return;
+    if (proximal_newton(best_.impulse(), 1e-3, steps(60))) return;
     for (const ShiftRule shift : {ShiftRule::kExact, ShiftRule::kLagged, ShiftRule::kDamped})
-      if (interior_point(shift)) return;
-    // An iteration costs in proportion to the size; the whole stage no more than a few seconds.
-    if (admm(p_.n <= kRobotSized ? 2000 : std::min(20000, 6000000 / p_.n))) return;
+      if (interior_point(shift, steps(80))) return;
+    if (admm(admm_iterations())) return;
     for (const double alpha : {1e-1, 1e-5, 1e-2}) {
       if (stubborn_sweeps(alpha < 1e-3 ? 1 : 0.7)) return;
-      if (proximal_newton(best_.impulse(), alpha, 150)) return;
+      if (proximal_newton(best_.impulse(), alpha, steps(150))) return;
     }
-    proximal_newton(Doubles(3 * p_.n), 1.0, 150);
+    proximal_newton(Doubles(3 * p_.n), 1.0, steps(150));
     // The best impulse may still be worse than none.
     std::fill(p_.lambda, p_.lambda + 3 * p_.n, 0.0);
     best_.offer(p_, SolveStage::kStart);
   }
 
  private:
-  /// Contacts that do not couple, even through others, are solved apart: a hard island no longer
-  /// holds up easy ones. True if there was more than one island; then each has had its turn.
+  /// Steps that a stage may take: a problem that nothing solves should not take minutes. A
+  /// factorization of a full matrix costs with the cube of its rows; block-sparse ones cost far
+  /// less.
+  int steps(int most) const {
+    if (p_.starts || p_.n <= kRobotSized) return most;
+    const double rows = 3.0 * p_.n;
+    return std::max(8, int(most * std::min(1.0, 1e8 / (rows * rows * rows))));
+  }
+  /// An iteration costs two triangular solves and one product.
+  int admm_iterations() const {
+    if (p_.n <= kRobotSized) return 2000;
+    const double blocks = p_.starts ? p_.starts[p_.n] : double(p_.n) * p_.n;
+    return int(std::clamp(6e7 / blocks, 200.0, 20000.0));
+  }
+
+  /// Contacts that do not couple, even through others, are solved apart: a hard island does not
+  /// hold up easy ones. True if there was more than one island; then each has had its turn.
   bool separate_islands() {
     const Islands islands(p_);
     if (islands.count() < 2) return false;
     best_.restore(p_);
+    const std::vector<double> start(p_.lambda, p_.lambda + 3 * p_.n);
+    std::vector<double> composed = start;
+    SolveStage stage = best_.stage();
     for (int k = 0; k < islands.count(); ++k) {
       const std::vector<int> contacts = islands.contacts(k);
       if (is_solved(contacts)) continue;
       const Island island(p_, contacts);
       BestImpulse best(best_.tolerance(), false, nullptr);
+      best.offer(island.view(), stage);  // so that no island ends worse than it began
       Chain(island.view(), best, max_sweeps_, effort_).run();
+      stage = std::max(stage, best.stage());
       for (std::size_t a = 0; a < contacts.size(); ++a)
-        std::copy_n(best.impulse().begin() + 3 * a, 3, p_.lambda + 3 * contacts[a]);
-      best_.offer(p_, best.stage());
+        std::copy_n(best.impulse().begin() + 3 * a, 3, composed.begin() + 3 * contacts[a]);
+      if (best_.records()) {
+        std::copy(composed.begin(), composed.end(), p_.lambda);
+        contact::refresh_velocity(p_);
+        best_.record(best.stage(), reachable_residual(p_, false));
+        std::copy(start.begin(), start.end(), p_.lambda);
+        contact::refresh_velocity(p_);
+      }
     }
+    std::copy(composed.begin(), composed.end(), p_.lambda);
+    best_.replace(p_, stage);
     return true;
   }
   bool is_solved(const std::vector<int>& contacts) const {
     for (const int i : contacts)
-      if (!(contact_residual(p_, i, false) <= best_.tolerance())) return false;
+      if (p_.local[i].inv_zz > 0 && !(contact_residual(p_, i, false) <= best_.tolerance()))
+        return false;
     return true;
   }
 
@@ -155,8 +183,8 @@ class Chain {
     o.tolerance = best_.tolerance();
     o.max_sweeps = max_sweeps_;
     o.alpha = relaxation;
-    effort_.sweeps += contact::per_contact(p_, o).sweeps;
-    return best_.offer(p_, SolveStage::kSweeps);
+    effort_.sweeps += recorded_sweeps(p_, o, best_, false).sweeps;
+    return best_.offer(p_, SolveStage::kSweeps, true);
   }
 
   bool proximal_newton(const Doubles& start, double alpha, int steps) {
@@ -169,12 +197,12 @@ class Chain {
   /// Small weights keep what a method has found out about which contacts are open, stick and slide.
   bool polish() {
     const Doubles end(p_.lambda, p_.lambda + 3 * p_.n, memory_);
-    return proximal_newton(end, 1e-8, 40) || proximal_newton(end, 1e-5, 40);
+    return proximal_newton(end, 1e-8, steps(40)) || proximal_newton(end, 1e-5, steps(40));
   }
 
-  bool interior_point(ShiftRule shift) {
+  bool interior_point(ShiftRule shift, int most) {
     InteriorPoint method(p_, memory_);
-    const bool solved = method.run(best_, shift, 80);
+    const bool solved = method.run(best_, shift, most);
     effort_.interior_point_steps += method.iterations();
     return solved || polish();
   }
@@ -204,8 +232,8 @@ void run_max_dissipation(ExplicitProblem& p, BestImpulse& best, int max_sweeps, 
   for (const double alpha : {1.0, 0.7}) {
     if (!best.impulse().empty()) best.restore(p);
     o.alpha = alpha;
-    effort.sweeps += contact::per_contact(p, o).sweeps;
-    if (best.offer(p, SolveStage::kSweeps)) return;
+    effort.sweeps += recorded_sweeps(p, o, best, false).sweeps;
+    if (best.offer(p, SolveStage::kSweeps, true)) return;
   }
 }
 

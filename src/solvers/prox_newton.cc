@@ -14,9 +14,9 @@ constexpr double kSmallestAlpha = 1e-12, kLargestAlpha = 1e5;
 }  // namespace
 
 ProxNewton::ProxNewton(contact::ExplicitProblem& p, Memory memory)
-    : p_(p), system_(p.n, memory), memory_(33 * std::size_t(p.n), memory), active_(memory) {
+    : p_(p), system_(p.n, memory), memory_(36 * std::size_t(p.n), memory), active_(memory) {
   double* next = memory_.data();
-  for (double** vector : {&center_, &origin_, &direction_, &u_, &F_}) {
+  for (double** vector : {&center_, &origin_, &direction_, &right_, &u_, &F_}) {
     *vector = next;
     next += 3L * p.n;
   }
@@ -65,10 +65,9 @@ bool ProxNewton::direction(double alpha) {
     for (int r = 0; r < 3; ++r) {
       direction_[3 * i + r] = -p_.lambda[3 * i + r];
       some_leave = some_leave || direction_[3 * i + r] != 0;
-      B_[9 * i + r] = direction_[3 * i + r];  // kept for the right-hand side
     }
   }
-  double* x = origin_;  // 3 active numbers; the caller saves origin_ afterwards
+  double* x = right_;
   for (std::size_t a = 0; a < active_.size(); ++a) {
     const int i = active_[a];
     double moved[3] = {0, 0, 0};
@@ -96,7 +95,8 @@ bool ProxNewton::direction(double alpha) {
 
 /// Newton with backtracking (C37) on one subproblem, from p.lambda (p.v up to date). True if
 /// solved.
-bool ProxNewton::subproblem(double alpha, double start_residual, double tolerance, int max_steps) {
+bool ProxNewton::subproblem(BestImpulse& best, double alpha, double start_residual,
+                            double tolerance, int max_steps) {
   double history[kMemory];
   shift_velocity(alpha);
   double m = merit();
@@ -118,6 +118,7 @@ bool ProxNewton::subproblem(double alpha, double start_residual, double toleranc
       if (m <= (1 - 1e-4 * t) * worst) break;
     }
     if (!std::isfinite(m)) return false;
+    if (best.records()) best.record_projected(p_, SolveStage::kProxNewton);
   }
   return false;
 }
@@ -136,8 +137,8 @@ bool ProxNewton::run(BestImpulse& best, double alpha, int max_steps) {
   while (!best.solved() && steps_ < last && alpha <= kLargestAlpha) {
     std::copy(p_.lambda, p_.lambda + 3 * p_.n, center_);
     const int before = steps_;
-    const bool solved = subproblem(alpha, residual, tolerance, last - steps_);
-    if (best.offer(p_, SolveStage::kProxNewton)) return true;
+    const bool solved = subproblem(best, alpha, residual, tolerance, last - steps_);
+    if (best.offer(p_, SolveStage::kProxNewton, true)) return true;
     const double reached = best.last_residual();
     if (solved && reached < 3 * residual) {
       alpha = std::max(alpha * (reached < 0.5 * residual ? 0.1 : 0.2), kSmallestAlpha);

@@ -25,7 +25,8 @@ class ProxNewton {
   int steps() const { return steps_; }
 
  private:
-  bool subproblem(double alpha, double start_residual, double tolerance, int max_steps);
+  bool subproblem(BestImpulse& best, double alpha, double start_residual, double tolerance,
+                  int max_steps);
   void shift_velocity(double alpha);
   double merit();
   bool direction(double alpha);
@@ -34,7 +35,7 @@ class ProxNewton {
   BlockSystem system_;
   // One block for all: small problems would spend more time on allocations than on a step.
   Doubles memory_;
-  double *center_, *origin_, *direction_, *u_, *F_, *A_, *B_;  // (3n) and, A and B, (9n)
+  double *center_, *origin_, *direction_, *right_, *u_, *F_, *A_, *B_;  // (3n) and, A and B, (9n)
   Integers active_;
   int steps_ = 0;
 };

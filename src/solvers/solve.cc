@@ -1,5 +1,7 @@
 // The public contact API on top of the methods: memory, choice of method, certificate
 // (docs/theory/solvers.md, sections 7 to 9).
+#include "solvers/solve.h"
+
 #include <stickslip/contact.h>
 #include <stickslip/errors.h>
 
@@ -7,8 +9,6 @@
 #include <cmath>
 
 #include "contact/method_of.h"
-#include "contact/per_contact.h"
-#include "contact/pgs.h"
 #include "solvers/admm.h"
 #include "solvers/certify.h"
 #include "solvers/chain.h"
@@ -16,6 +16,7 @@
 #include "solvers/interior_point.h"
 #include "solvers/minimum_norm.h"
 #include "solvers/prox_newton.h"
+#include "solvers/recorded_sweeps.h"
 #include "solvers/validate.h"
 
 namespace stickslip {
@@ -48,33 +49,21 @@ static_assert(int(StopTest::kResidual) == int(contact::StopTest::kResidual) &&
               int(StopTest::kViolationSum) == int(contact::StopTest::kViolationSum) &&
               int(StopTest::kUpdateSum) == int(contact::StopTest::kUpdateSum));
 
-/// One sweep loop, by the paper's methods. The history takes the residual of each sweep, which
-/// costs nothing where it is the stop test; then the best sweep is kept, not the last.
 void run_sweeps(ExplicitProblem& p, const SolveOptions& o, BestImpulse& best, Effort& effort) {
-  contact::SweepOptions s = sweep_options(o, best.tolerance());
-  struct Record {
-    ExplicitProblem& p;
-    BestImpulse& best;
-    bool by_residual;
-  } record{p, best, o.stop == StopTest::kResidual && !best.max_dissipation()};
-  if (best.records() || record.by_residual) {
-    s.history = &record;
-    s.record = [](void* to, double error) {
-      auto& [problem, b, by_residual] = *static_cast<Record*>(to);
-      const double r = by_residual ? error : reachable_residual(problem, b.max_dissipation());
-      if (by_residual) b.keep(problem, SolveStage::kSweeps, r);
-      b.record(SolveStage::kSweeps, r);
-    };
-  }
-  effort.sweeps +=
-      (o.method == SolveMethod::kPgs ? contact::pgs(p, s) : contact::per_contact(p, s)).sweeps;
+  const contact::SweepOptions s = sweep_options(o, best.tolerance());
+  effort.sweeps += solvers::recorded_sweeps(p, s, best, o.method == SolveMethod::kPgs).sweeps;
   best.offer(p, SolveStage::kSweeps, true);
 }
 
+/// Of a method chosen by name.
+int iteration_limit(const SolveOptions& o) {
+  if (o.max_iterations > 0) return o.max_iterations;
+  return o.method == SolveMethod::kProxNewton      ? 500
+         : o.method == SolveMethod::kInteriorPoint ? 100
+                                                   : 5000;
+}
+
 void run_method(ExplicitProblem& p, const SolveOptions& o, BestImpulse& best, Effort& effort) {
-  const auto limit = [&](int standard) {
-    return o.max_iterations > 0 ? o.max_iterations : standard;
-  };
   switch (o.method) {
     case SolveMethod::kAuto:
       return run_chain(p, best, o.max_sweeps, effort);
@@ -83,19 +72,19 @@ void run_method(ExplicitProblem& p, const SolveOptions& o, BestImpulse& best, Ef
       return run_sweeps(p, o, best, effort);
     case SolveMethod::kProxNewton: {
       solvers::ProxNewton method(p);
-      method.run(best, o.proximal_weight, limit(500));
+      method.run(best, o.proximal_weight, iteration_limit(o));
       effort.newton_steps = method.steps();
       return;
     }
     case SolveMethod::kInteriorPoint: {
       solvers::InteriorPoint method(p);
-      method.run(best, o.shift, limit(100));
+      method.run(best, o.shift, iteration_limit(o));
       effort.interior_point_steps = method.iterations();
       return;
     }
     case SolveMethod::kAdmm: {
       solvers::Admm method(p);
-      method.run(best, limit(5000));
+      method.run(best, iteration_limit(o));
       effort.admm_iterations = method.iterations();
       return;
     }
@@ -109,11 +98,29 @@ bool infeasible(const ExplicitProblem& p, double tolerance) {
   return false;
 }
 
-SolveStatus status_of(const ExplicitProblem& p, const SolveOptions& o, double residual,
-                      double tolerance) {
+/// The method stopped because it had used up its sweeps or iterations, and not because it saw no
+/// way on.
+bool used_up(const SolveOptions& o, const Effort& e) {
+  switch (o.method) {
+    case SolveMethod::kPerContact:
+    case SolveMethod::kPgs:
+      return e.sweeps >= o.max_sweeps;
+    case SolveMethod::kProxNewton:
+      return e.newton_steps >= iteration_limit(o);
+    case SolveMethod::kInteriorPoint:
+      return e.interior_point_steps >= iteration_limit(o);
+    case SolveMethod::kAdmm:
+      return e.admm_iterations >= iteration_limit(o);
+    default:
+      return false;
+  }
+}
+
+SolveStatus status_of(const ExplicitProblem& p, const SolveOptions& o, const Effort& effort,
+                      double residual, double tolerance) {
   if (residual <= tolerance) return SolveStatus::kConverged;
   if (infeasible(p, tolerance)) return SolveStatus::kInfeasible;
-  return o.method == SolveMethod::kAuto ? SolveStatus::kStalled : SolveStatus::kIterationLimit;
+  return used_up(o, effort) ? SolveStatus::kIterationLimit : SolveStatus::kStalled;
 }
 
 /// Changes p.lambda by `change`, and back if the residual then exceeds `allowed`. p.v is up to date
@@ -131,55 +138,79 @@ bool improve(ExplicitProblem& p, double allowed, F&& change) {
 
 /// The certificate of p.lambda. A method that approaches the cones from inside may leave contacts
 /// near to sliding or to opening, where the residual is small and the backward error is not: then
-/// they are settled.
-Certificate settled_certificate(ExplicitProblem& p, const SolveOptions& o, double tolerance) {
-  Certificate c = solvers::certify(p, is_max_dissipation(o.law));
-  if (is_max_dissipation(o.law) || c.backward_error <= 2 * std::max(tolerance, c.residual))
-    return c;
-  if (improve(p, std::max(tolerance, c.residual), [&] { solvers::settle_on_cones(p); }))
+/// they are settled, as long as the residual, `reached` before, stays within the tolerance.
+Certificate settled_certificate(ExplicitProblem& p, double tolerance, double reached) {
+  Certificate c = solvers::certify(p, false);
+  if (c.backward_error <= 2 * std::max(tolerance, c.residual)) return c;
+  if (improve(p, std::max(tolerance, reached), [&] { solvers::settle_on_cones(p); }))
     c = solvers::certify(p, false);
   return c;
 }
 
+/// The starts: the caller's, and rest if that is better or the only one.
+void offer_starts(ExplicitProblem& p, BestImpulse& best, bool warm) {
+  if (warm && best.offer(p, SolveStage::kStart)) return;
+  std::fill(p.lambda, p.lambda + 3 * p.n, 0.0);
+  best.offer(p, SolveStage::kStart);
+  best.restore(p);
+}
+
 }  // namespace
 
-SolveResult solve(const ContactProblem& problem, const SolveOptions& options,
-                  const std::vector<double>& warm_start) {
+namespace solvers {
+
+SolveResult solve_checked(const ContactProblem& problem, const SolveOptions& options,
+                          const std::vector<double>& warm_start) {
   options.validate();
-  problem.validate();
   const int n = problem.num_contacts();
-  if (!warm_start.empty()) solvers::check_impulse("the warm start", warm_start, n);
+  if (!warm_start.empty()) check_impulse("the warm start", warm_start, n);
   const bool max_dissipation = is_max_dissipation(options.law);
   const double tolerance = allowed_residual(problem, options);
 
   SolveResult r;
   Effort effort;
-  solvers::ExplicitView e(problem, warm_start);
+  ExplicitView e(problem, warm_start);
   BestImpulse best(tolerance, max_dissipation, options.record_history ? &r.history : nullptr);
-  const bool by_residual =
-      options.stop == StopTest::kResidual ||
-      (options.method != SolveMethod::kPerContact && options.method != SolveMethod::kPgs);
-  // What costs nothing to try: the start itself.
-  const bool tried = !warm_start.empty() || n == 0 || options.method != SolveMethod::kAuto;
-  if (!(tried && best.offer(e.view, SolveStage::kStart) && by_residual))
-    run_method(e.view, options, best, effort);
+  const bool sweeps_alone =
+      options.method == SolveMethod::kPerContact || options.method == SolveMethod::kPgs;
+  const bool by_residual = options.stop == StopTest::kResidual || !sweeps_alone;
+  // The chain offers rest itself, if nothing else comes; trying it first would cost as much as a
+  // sweep.
+  if (!warm_start.empty() || n == 0 || options.method != SolveMethod::kAuto)
+    offer_starts(e.view, best, !warm_start.empty());
+  if (!(best.solved() && by_residual)) run_method(e.view, options, best, effort);
   // Everything reported is recomputed from the impulse that is returned.
   best.restore(e.view);
   if (options.minimum_norm)
     improve(e.view, std::max(tolerance, best.residual()), [&] {
-      solvers::minimize_tangential_impulses(e.view, std::max(tolerance, 10 * best.residual()));
+      minimize_tangential_impulses(e.view, std::max(tolerance, 10 * best.residual()));
     });
-  r.certificate = best.stage() == SolveStage::kStart
-                      ? solvers::certify(e.view, max_dissipation)
-                      : settled_certificate(e.view, options, tolerance);
+  r.certificate = max_dissipation || best.stage() == SolveStage::kStart
+                      ? certify(e.view, max_dissipation)
+                      : settled_certificate(e.view, tolerance, best.residual());
   r.velocity.assign(e.view.v, e.view.v + 3 * n);
   r.impulse.assign(e.view.lambda, e.view.lambda + 3 * n);
   r.stage = best.stage();
-  r.status = status_of(e.view, options, r.certificate.residual, tolerance);
+  r.status = status_of(e.view, options, effort, r.certificate.residual, tolerance);
   r.sweeps = effort.sweeps, r.newton_steps = effort.newton_steps;
   r.interior_point_steps = effort.interior_point_steps;
   r.admm_iterations = effort.admm_iterations;
   return r;
+}
+
+Certificate certify_checked(const ContactProblem& problem, const std::vector<double>& impulse,
+                            FrictionLaw law) {
+  check_impulse("the impulse", impulse, problem.num_contacts());
+  const ExplicitView e(problem, impulse);
+  return certify(e.view, is_max_dissipation(law));
+}
+
+}  // namespace solvers
+
+SolveResult solve(const ContactProblem& problem, const SolveOptions& options,
+                  const std::vector<double>& warm_start) {
+  problem.validate();
+  return solvers::solve_checked(problem, options, warm_start);
 }
 
 std::vector<double> residual(const ContactProblem& problem, const std::vector<double>& impulse,
@@ -190,9 +221,7 @@ std::vector<double> residual(const ContactProblem& problem, const std::vector<do
 Certificate certify(const ContactProblem& problem, const std::vector<double>& impulse,
                     FrictionLaw law) {
   problem.validate();
-  solvers::check_impulse("the impulse", impulse, problem.num_contacts());
-  const solvers::ExplicitView e(problem, impulse);
-  return solvers::certify(e.view, is_max_dissipation(law));
+  return solvers::certify_checked(problem, impulse, law);
 }
 
 SingleContactResult solve_contact(const double delassus[9], const double free_velocity[3],

@@ -17,7 +17,8 @@
 namespace stickslip {
 namespace {
 
-constexpr double kAsymmetry = 1e-9;  // of the largest entry: rounding
+constexpr double kSmallest = 1e-75, kLargest = 1e75;  // of operators and velocities
+constexpr double kAsymmetry = 1e-9;                   // of the largest entry: rounding
 constexpr double kIndefinite =
     1e-6;  // of the largest diagonal entry: rounding, also of files in text
 
@@ -90,7 +91,7 @@ void check_dense(const std::vector<double>& G, int m) {
   }
   if (!(sums[0] + sums[1] + sums[2] + sums[3] == 0))
     for (std::size_t i = 0; i < size; ++i)
-      if (!std::isfinite(g[i])) fail_not_finite(int(i) / m, int(i) % m, g[i]);
+      if (!std::isfinite(g[i])) fail_not_finite(int(i / m), int(i % m), g[i]);
   const double allowed = kAsymmetry * max(max(most[0], most[1]), max(most[2], most[3]));
   bool fine = true;
   for (int i = 0; i < m; ++i) {
@@ -114,10 +115,11 @@ void check_blocks(const ContactProblem& p, int n) {
   if (starts[0] != 0 || starts[n] < 0 || std::size_t(starts[n]) != blocks)
     fail("ContactProblem.block_starts runs from ", starts[0], " to ", starts[n],
          "; it must run from 0 to ", blocks, ", the number of block_columns");
-  for (int i = 0; i < n; ++i) {
+  for (int i = 0; i < n; ++i)
     if (starts[i] > starts[i + 1])
       fail("ContactProblem.block_starts[", i + 1, "] is ", starts[i + 1],
            ", less than the one before, ", starts[i]);
+  for (int i = 0; i < n; ++i) {
     bool diagonal = false;
     for (int k = starts[i]; k < starts[i + 1]; ++k) {
       const int j = p.block_columns[k];
@@ -167,13 +169,14 @@ void check_block_sparse(const ContactProblem& p, int n) {
     }
 }
 
-/// Cholesky of G + shift, on the upper triangle, for problems of robot size.
-bool is_small_definite(const std::vector<double>& G, int m, double shift) {
+/// Cholesky of G + shift, on the upper triangle, for problems of robot size. The first row without
+/// a positive pivot, or -1.
+int first_bad_pivot(const std::vector<double>& G, int m, double shift) {
   std::vector<double> u(G);
   for (int j = 0; j < m; ++j) {
     double* __restrict__ top = u.data() + std::size_t(j) * m;
     const double pivot = top[j] + shift;
-    if (!(pivot > 0)) return false;
+    if (!(pivot > 0)) return j;
     const double inverse = 1 / pivot;
     for (int i = j + 1; i < m; ++i) {
       if (top[i] == 0) continue;
@@ -182,12 +185,20 @@ bool is_small_definite(const std::vector<double>& G, int m, double shift) {
       for (int k = i; k < m; ++k) row[k] = madd(f, top[k], row[k]);
     }
   }
-  return true;
+  return -1;
+}
+
+/// Squares of velocities and impulses must neither overflow nor vanish.
+void check_range(const char* what, const char* unit, double largest) {
+  if (largest == 0 || (largest >= kSmallest && largest <= kLargest)) return;
+  fail("ContactProblem.", what, " has a largest entry of ", largest, " ", unit,
+       "; it must be 0 or lie in [", kSmallest, ", ", kLargest, "] (choose other units)");
 }
 
 /// J M^-1 J^T has no negative eigenvalue; one of at most kIndefinite of the largest diagonal entry
 /// is taken for rounding.
 void check_semidefinite(const ContactProblem& p, int n) {
+  if (n == 0) return;
   double largest = 0;
   for (int i = 0; i < n; ++i) {
     const double* block = p.is_block_sparse() ? block_at(p, i, i) : nullptr;
@@ -196,15 +207,18 @@ void check_semidefinite(const ContactProblem& p, int n) {
       largest = std::max(largest, block ? block[4 * r] : p.delassus[at * 3 * n + at]);
     }
   }
+  check_range("delassus", "1/kg", largest);
   // Shifted by a zero matrix's own size: a zero diagonal allows no other entry.
   const double shift = largest > 0 ? kIndefinite * largest : 1e-300;
-  const bool small = !p.is_block_sparse() && n <= solvers::BlockSystem::kDenseRows / 3;
-  if (small ? is_small_definite(p.delassus, 3 * n, shift)
-            : solvers::is_definite(solvers::ExplicitView(p, {}).view, shift))
-    return;
-  fail("ContactProblem.delassus is indefinite: it has an eigenvalue below ", -shift,
-       " 1/kg, that is -", kIndefinite,
-       " of the largest diagonal entry; J M^-1 J^T is positive semidefinite");
+  const char* reason = " of the largest diagonal entry; J M^-1 J^T is positive semidefinite";
+  if (!p.is_block_sparse() && n <= solvers::BlockSystem::kDenseRows / 3) {
+    if (const int row = first_bad_pivot(p.delassus, 3 * n, shift); row >= 0)
+      fail("ContactProblem.delassus is indefinite: rows and columns 0 to ", row,
+           " have an eigenvalue below ", -shift, " 1/kg, that is -", kIndefinite, reason);
+  } else if (!solvers::is_definite(solvers::ExplicitView(p, {}).view, shift)) {
+    fail("ContactProblem.delassus is indefinite: it has an eigenvalue below ", -shift,
+         " 1/kg, that is -", kIndefinite, reason);
+  }
 }
 
 }  // namespace
@@ -259,10 +273,14 @@ void ContactProblem::validate() const {
     check_dense(delassus, int(3 * n));
   }
   check_length("free_velocity", free_velocity.size(), 3 * n, "(3n)", int(n));
-  for (std::size_t i = 0; i < 3 * n; ++i)
+  double fastest = 0;
+  for (std::size_t i = 0; i < 3 * n; ++i) {
     if (!std::isfinite(free_velocity[i]))
       fail("ContactProblem.free_velocity[", i, "] is ", free_velocity[i],
            "; every entry must be finite");
+    fastest = max(fastest, abs(free_velocity[i]));
+  }
+  check_range("free_velocity", "m/s", fastest);
   for (std::size_t i = 0; i < n; ++i) {
     if (std::isnan(friction[i]))
       fail("ContactProblem.friction[", i, "] is nan; it must be zero or positive");
