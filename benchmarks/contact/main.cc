@@ -25,8 +25,7 @@ constexpr const char* kUsage =
     "  --solvers A,B     only solvers whose name starts so, as in 'stickslip,pinocchio admm'\n"
     "  --share X         times the usual count of problems (default 1)\n"
     "  --rounds N        counted ones, after one that warms up (default 5)\n"
-    "  --patience X      [s] a method that has taken longer for a set is not timed again (default "
-    "1)\n"
+    "  --patience X      [s] a method that has taken longer for a set is not timed again (0.5)\n"
     "  --core N          pin to this core (default 1 where there is one, else 0; -1: none)\n"
     "  --json FILE       write time and residual of every problem there\n";
 

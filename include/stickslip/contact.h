@@ -51,24 +51,22 @@ enum class SolveStage {
   kAdmm,           ///< ADMM
 };
 
-/// How a solve ended. Whatever the status, the impulse returned is the best one found, inside its
-/// cones, and the certificate says how good it is.
+/// How a solve ended. Whatever the status, the impulse returned is the best one met, inside its
+/// cones (settled on them where the residual stays within the tolerance), and the certificate says
+/// how good it is.
 enum class SolveStatus {
-  /// Cause: the residual is at most the tolerance. Consequence: the impulse is the exact answer to
-  /// a
-  /// problem whose contact velocities differ by the certificate's backward error. Remedy: none
-  /// needed.
+  /// Cause: the residual is at most the tolerance. Consequence: under Coulomb's law the impulse is
+  /// the exact answer to a problem whose contact velocities differ by the certificate's backward
+  /// error. Remedy: none needed.
   kConverged,
   /// Cause: a method chosen by name used up max_sweeps or max_iterations. Consequence: the laws
-  /// hold
-  /// up to the residual only. Remedy: raise the limit, or use kAuto.
+  /// hold up to the residual only. Remedy: raise the limit, or use kAuto.
   kIterationLimit,
-  /// Cause: every stage ended above the tolerance: it lies below the rounding of the problem, or
-  /// friction jams (Painleve) and no finite impulse exists, or the problem is harder than the
-  /// methods.
-  /// Consequence: as above. Remedy: compare the residual with 1e-16 times the largest G_ii
-  /// |lambda_i|;
-  /// check friction and geometry; in a simulation halve the step.
+  /// Cause: the method, or every stage of kAuto, saw no way on above the tolerance: it lies below
+  /// the rounding of the problem, or friction jams (Painleve) and no finite impulse exists, or the
+  /// problem is too hard. Consequence: as above. Remedy: kAuto; compare the residual with 1e-16
+  /// times the largest G_ii |lambda_i|; check friction and geometry; in a simulation halve the
+  /// step.
   kStalled,
   /// Cause: a contact cannot push (G_zz near 0: its body is held along the normal) and is driven
   /// in.
@@ -171,7 +169,9 @@ struct SolveResult {
   int interior_point_steps = 0;
   int admm_iterations = 0;
   SolveStatus status = SolveStatus::kStalled;
-  std::vector<HistoryEntry> history;  ///< if recorded: one entry per sweep, step or iteration
+  /// If recorded: one entry per start, sweep, Newton or interior-point step, ADMM iteration; of
+  /// islands that are solved apart, one entry each.
+  std::vector<HistoryEntry> history;
 };
 
 /// Solves a problem; `warm_start` is empty or (3n). Throws only for bad input (see `validate`).

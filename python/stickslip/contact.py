@@ -56,8 +56,8 @@ class ContactProblem:
             values, starts, columns = self._delassus.data, self._delassus.indptr, self._delassus.indices
         else:
             self._delassus = values = _shaped("delassus", delassus, (3 * n, 3 * n), n)
-            starts = columns = ()
-        for a in (values, self._free_velocity, self._friction):
+            starts = columns = np.empty(0, dtype=np.int32)
+        for a in (values, starts, columns, self._free_velocity, self._friction):
             a.flags.writeable = False  # a problem that changed after its checks would not be checked
         self._core = _core.CheckedProblem(
             values.reshape(-1), self._free_velocity, mu, [int(k) for k in starts], [int(k) for k in columns]
@@ -91,7 +91,11 @@ class ContactProblem:
     @property
     def delassus(self) -> Array | sparse.bsr_array:
         """(3n, 3n) [1/kg], read-only: an array, or a `scipy.sparse.bsr_array` with 3 x 3 blocks where it was given sparse."""
-        return self._delassus
+        if not self.is_sparse:
+            return self._delassus
+        # A matrix of its own on the same read-only memory: what is set on it does not reach the problem.
+        kept = self._delassus
+        return type(kept)((kept.data, kept.indices, kept.indptr), shape=kept.shape, copy=False)
 
     @property
     def is_sparse(self) -> bool:
@@ -122,6 +126,9 @@ class ContactProblem:
         """3, or 2 for a problem made by `planar`."""
         return self._dimension
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _unpickled, (self._delassus, self._free_velocity, self._friction, self._dimension)
+
     def __repr__(self) -> str:
         form = "planar, " if self.dimension == 2 else "block sparse, " if self.is_sparse else ""
         return f"ContactProblem({form}{self.num_contacts} contacts)"
@@ -147,7 +154,10 @@ class Certificate:
 
 @dataclass(frozen=True)
 class History:
-    """How a solve came about: one entry per sweep, step or iteration. Empty unless asked for."""
+    """How a solve came about: one entry per start, sweep, step or iteration (of islands solved apart, one each).
+
+    Empty unless asked for.
+    """
 
     stage: list[Stage]  #: (k)
     residual: Array  #: (k,) of the impulse at that point, projected on its cones [m/s]
@@ -164,8 +174,9 @@ class ContactSolution:
     status: what ended the solve; whatever it is, the impulse is finite and inside its cones, and the certificate true.
         "converged": the residual is within the tolerance.
         "iteration_limit": a method chosen by name used up its sweeps or iterations. Raise the limit, or use "auto".
-        "stalled": every stage of "auto" ended above the tolerance: it lies below the rounding of the problem, or friction jams
-            and no finite impulse exists, or the problem is too hard. Compare the residual with 1e-16 |G_ii| |impulse_i|.
+        "stalled": the method, or every stage of "auto", saw no way on: the tolerance lies below the rounding of the problem, or
+            friction jams and no finite impulse exists, or the problem is too hard. Use "auto"; compare the residual with
+            1e-16 |G_ii| |impulse_i|.
         "infeasible": a contact that cannot push (G_zz near 0) is driven in; no impulse helps. Drop it, or let its body move.
     """
 
@@ -309,7 +320,8 @@ def solve_contact(
         G.reshape(-1), c, float(friction), str(method), str(law), number("tolerance", tolerance)
     )
     if not converged:
-        raise ArithmeticError(f"{method} did not solve this contact to {tolerance}; use method='halley'")
+        cure = "no finite impulse does: it jams" if method == "halley" else "use method='halley'"
+        raise ArithmeticError(f"{method} did not solve this contact to {tolerance}; {cure}")
     return x
 
 
@@ -349,6 +361,7 @@ def _blocks(matrix: sparse.sparray, n: int) -> sparse.bsr_array:
         raise ValueError(
             f"delassus has shape {matrix.shape}; it must be {(3 * n, 3 * n)} for {n} contacts (as many as friction has)"
         )
+    _check_kind("delassus", matrix.dtype)
     try:
         coo = sparse.coo_array(matrix, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -363,6 +376,12 @@ def _blocks(matrix: sparse.sparray, n: int) -> sparse.bsr_array:
     return blocks
 
 
+def _unpickled(delassus: Any, free_velocity: Array, friction: Array, dimension: int) -> ContactProblem:
+    problem = ContactProblem(delassus, free_velocity, friction)
+    problem._dimension = dimension
+    return problem
+
+
 def _problem(value: ContactProblem) -> ContactProblem:
     if not isinstance(value, ContactProblem):
         raise TypeError(f"problem is a {type(value).__name__}; a ContactProblem is wanted")
@@ -372,9 +391,16 @@ def _problem(value: ContactProblem) -> ContactProblem:
 def _numbers(name: str, value: ArrayLike) -> Array:
     """A contiguous copy as float64; NaN is left to the checks that name it."""
     try:
+        _check_kind(name, np.asarray(value).dtype)
         return np.array(value, dtype=np.float64, order="C", copy=True)
     except (TypeError, ValueError) as error:
         raise type(error)(f"{name}: not an array of numbers ({error})") from None
+
+
+def _check_kind(name: str, dtype: np.dtype[Any]) -> None:
+    """Numbers that are real: complex ones would lose their imaginary part, texts would be parsed."""
+    if dtype.kind not in "biufO":
+        raise ValueError(f"{name} holds {dtype}; it must hold real numbers")
 
 
 def _shaped(name: str, value: ArrayLike, shape: tuple[int, ...], contacts: int | None = None) -> Array:

@@ -239,12 +239,13 @@ void run_max_dissipation(ExplicitProblem& p, BestImpulse& best, int max_sweeps, 
 
 }  // namespace
 
-void run_chain(ExplicitProblem& p, BestImpulse& best, int max_sweeps, Effort& effort) {
+void run_chain(ExplicitProblem& p, BestImpulse& best, int max_sweeps, Effort& effort,
+               Memory memory) {
   if (p.n == 0) return;
   if (best.max_dissipation())
     run_max_dissipation(p, best, max_sweeps, effort);
   else
-    Chain(p, best, max_sweeps, effort).run();
+    Chain(p, best, max_sweeps, effort, memory).run();
 }
 
 std::size_t brief_chain_bytes(int contacts) {

@@ -15,7 +15,8 @@ struct Effort {
 /// has had its turn. Coulomb's law: sweeps with a Newton finish, proximal Newton, interior point,
 /// ADMM. Maximum dissipation is no complementarity problem in the velocity: sweeps, plain and
 /// relaxed, at most `max_sweeps` each.
-void run_chain(contact::ExplicitProblem& p, BestImpulse& best, int max_sweeps, Effort& effort);
+void run_chain(contact::ExplicitProblem& p, BestImpulse& best, int max_sweeps, Effort& effort,
+               Memory memory = std::pmr::get_default_resource());
 
 /// Contacts up to which a Newton step costs about as much as a few sweeps, and own factors serve.
 inline constexpr int kRobotSized = BlockSystem::kDenseRows / 3;

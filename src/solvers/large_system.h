@@ -23,7 +23,7 @@ class LargeSystem {
   std::unique_ptr<Factors> factors_;
 };
 
-/// The largest eigenvalue of G below zero is at least -shift: G + shift is positive definite.
+/// No eigenvalue of G is below -shift: G + shift is positive definite.
 bool is_definite(const contact::ExplicitProblem& p, double shift);
 
 }  // namespace stickslip::solvers

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 
 #include "contact/method_of.h"
 #include "solvers/admm.h"
@@ -25,6 +26,8 @@ namespace {
 using contact::ExplicitProblem;
 using solvers::BestImpulse;
 using solvers::Effort;
+
+constexpr std::size_t kStackBytes = 1 << 14;
 
 bool is_max_dissipation(FrictionLaw law) { return law == FrictionLaw::kMaxDissipation; }
 
@@ -63,10 +66,11 @@ int iteration_limit(const SolveOptions& o) {
                                                    : 5000;
 }
 
-void run_method(ExplicitProblem& p, const SolveOptions& o, BestImpulse& best, Effort& effort) {
+void run_method(ExplicitProblem& p, const SolveOptions& o, BestImpulse& best, Effort& effort,
+                solvers::Memory memory) {
   switch (o.method) {
     case SolveMethod::kAuto:
-      return run_chain(p, best, o.max_sweeps, effort);
+      return run_chain(p, best, o.max_sweeps, effort, memory);
     case SolveMethod::kPerContact:
     case SolveMethod::kPgs:
       return run_sweeps(p, o, best, effort);
@@ -147,12 +151,18 @@ Certificate settled_certificate(ExplicitProblem& p, double tolerance, double rea
   return c;
 }
 
-/// The starts: the caller's, and rest if that is better or the only one.
-void offer_starts(ExplicitProblem& p, BestImpulse& best, bool warm) {
-  if (warm && best.offer(p, SolveStage::kStart)) return;
+/// Offers rest, and before it the caller's start, which p.lambda is: methods go on from that one
+/// even where rest is better, since it may know which contacts push; but not where it is absurd.
+void offer_starts(ExplicitProblem& p, BestImpulse& best, const std::vector<double>& warm_start) {
+  constexpr double kAbsurd = 1e3;
+  if (!warm_start.empty() && best.offer(p, SolveStage::kStart)) return;
+  const double warm = best.last_residual();
   std::fill(p.lambda, p.lambda + 3 * p.n, 0.0);
   best.offer(p, SolveStage::kStart);
-  best.restore(p);
+  if (warm_start.empty() || !(warm <= kAbsurd * best.last_residual())) return;
+  std::copy(warm_start.begin(), warm_start.end(), p.lambda);
+  solvers::project_on_cones(p);
+  contact::refresh_velocity(p);
 }
 
 }  // namespace
@@ -170,15 +180,20 @@ SolveResult solve_checked(const ContactProblem& problem, const SolveOptions& opt
   SolveResult r;
   Effort effort;
   ExplicitView e(problem, warm_start);
-  BestImpulse best(tolerance, max_dissipation, options.record_history ? &r.history : nullptr);
+  // What a robot-sized problem needs beside its own arrays lies on the stack: allocations would
+  // take a fifth of its time.
+  alignas(64) std::byte block[kStackBytes];
+  std::pmr::monotonic_buffer_resource memory(block, sizeof block);
+  BestImpulse best(tolerance, max_dissipation, options.record_history ? &r.history : nullptr,
+                   &memory);
   const bool sweeps_alone =
       options.method == SolveMethod::kPerContact || options.method == SolveMethod::kPgs;
   const bool by_residual = options.stop == StopTest::kResidual || !sweeps_alone;
   // The chain offers rest itself, if nothing else comes; trying it first would cost as much as a
   // sweep.
   if (!warm_start.empty() || n == 0 || options.method != SolveMethod::kAuto)
-    offer_starts(e.view, best, !warm_start.empty());
-  if (!(best.solved() && by_residual)) run_method(e.view, options, best, effort);
+    offer_starts(e.view, best, warm_start);
+  if (!(best.solved() && by_residual)) run_method(e.view, options, best, effort, &memory);
   // Everything reported is recomputed from the impulse that is returned.
   best.restore(e.view);
   if (options.minimum_norm)

@@ -369,7 +369,8 @@ def test_run_names_problems_and_keeps_their_order():
 def test_histories_lead_to_the_residual_of_the_record():
     for r in compare_solvers.run([STACK, QUADRUPED], SOLVE_METHODS, history=True):
         best = min(r.history.residual)
-        assert best == pytest.approx(r.residual, rel=1e-9) if r.solved else best < r.residual * (1 + 1e-9)
+        # A solved impulse may have been settled on its cones since, within the tolerance.
+        assert best <= r.tolerance and r.residual <= r.tolerance if r.solved else best <= r.residual * (1 + 1e-9)
         assert (np.diff(r.history.time) >= 0).all()
     assert compare_solvers.run([STACK])[0].history is None
 

@@ -1,5 +1,8 @@
 """Contact problems from Python: shapes, errors, both laws, every method, agreement with the residual."""
 
+import copy
+import pickle
+
 import hypothesis
 import numpy as np
 import pytest
@@ -153,7 +156,10 @@ def test_bad_problems_raise_with_the_place():
         ((G, [1, np.inf, 0], mu), r"free_velocity\[1\] is inf"),
         ((G, C, [-0.5]), r"friction\[0\] is -0.5"),
         ((G, C, [np.nan]), r"friction\[0\] is nan"),
-        ((G, "abc", mu), "free_velocity: not an array of numbers"),
+        ((G, "abc", mu), "free_velocity holds <U3; it must hold real numbers"),
+        ((G * (1 + 1j), C, mu), "delassus holds complex128; it must hold real numbers"),
+        ((G * 1e80, C, mu), r"delassus has a largest entry of 1e\+80 1/kg; it must be 0 or lie in \[1e-75, 1e\+75\]"),
+        ((G, C * 1e-80, mu), "free_velocity has a largest entry of 3e-80 m/s"),
     ]:
         with pytest.raises(ValueError, match=text):
             ss.ContactProblem(*args)
@@ -265,6 +271,7 @@ def test_bad_sparse_problems_raise_with_the_place():
     broken[1, 2] = np.nan
     for matrix, text in [
         (sparse.csr_array((5, 6)), r"delassus has shape \(5, 6\); it must be \(6, 6\) for 2 contacts"),
+        (good * 1j, "delassus holds complex128"),
         (sparse.csr_array(skewed), r"not symmetric: \[0, 4\] and \[4, 0\] differ by 1 "),
         (sparse.csr_array(negative), r"delassus\[4, 4\] is -2"),
         (sparse.csr_array(broken), r"delassus\[1, 2\] is nan"),
@@ -293,3 +300,53 @@ def test_redundant_contacts_may_ask_for_the_least_tangential_impulses():
     assert np.linalg.norm(tangential[1]) <= np.linalg.norm(tangential[0]) * (1 + 1e-12)
     assert b.converged
     np.testing.assert_allclose(a.velocity, b.velocity, atol=1e-7)
+
+
+def test_an_empty_sparse_problem_is_solved():
+    s = ss.solve(ss.ContactProblem(sparse.csr_array((0, 0)), [], []))
+    assert s.converged and s.impulse.shape == (0,)
+
+
+@pytest.mark.parametrize("make", [np.asarray, sparse.csr_array], ids=["dense", "sparse"])
+def test_problems_are_copied_and_pickled_whole(make):
+    p = ss.ContactProblem(make(random_problem(2).delassus), np.ones(6), [0.5, 0.6])
+    for q in (copy.deepcopy(p), pickle.loads(pickle.dumps(p))):
+        assert q.is_sparse == p.is_sparse
+        np.testing.assert_array_equal(q.dense_delassus(), p.dense_delassus())
+        np.testing.assert_array_equal(ss.solve(q).impulse, ss.solve(p).impulse)
+    planar = pickle.loads(pickle.dumps(ss.ContactProblem.planar(np.eye(2), [1, -1], [0.5])))
+    assert planar.dimension == 2
+
+
+def test_a_sparse_problem_cannot_be_changed_through_what_it_returns():
+    p = ss.ContactProblem(sparse.csr_array(random_problem(2).delassus), np.ones(6), [0.5, 0.6])
+    kept = p.dense_delassus()
+    for array in (p.delassus.data, p.delassus.indices, p.delassus.indptr):
+        with pytest.raises(ValueError):
+            array[0] = 1
+    p.delassus.data = np.zeros_like(p.delassus.data)
+    np.testing.assert_array_equal(p.dense_delassus(), kept)
+
+
+@pytest.mark.parametrize("method", ss.contact.SOLVE_METHODS)
+@pytest.mark.parametrize("size", [1e3, 1e100, 1e160])
+def test_a_bad_start_is_no_worse_than_none(method, size):
+    p = ss.problems.quadruped_impact(seed=2)
+    start = size * np.tile([1.0, -1, 2], p.num_contacts)
+    s = ss.solve(p, method, impulse=start, tolerance=1e-6, max_sweeps=5000)
+    rest = ss.solve(p, method, tolerance=1e-6, max_sweeps=5000)
+    assert s.converged == rest.converged and s.residual <= max(rest.residual, 1e-6) * (1 + 1e-9)
+
+
+def test_impulses_that_overflow_have_an_infinite_residual():
+    p = random_problem(2)
+    c = ss.certify(p, np.full(6, 1e300))
+    assert c.residual == np.inf and not np.isnan(c.residuals).any() and not np.isnan(c.backward_errors).any()
+
+
+@pytest.mark.parametrize("alpha", [0.5, 1.5, 1.9])
+def test_relaxed_sweeps_end_inside_the_cones(alpha):
+    for seed in range(10):
+        p = random_problem(4, seed)
+        s = ss.solve(p, "per_contact", alpha=alpha, alpha_min=alpha, max_sweeps=7, tolerance=1e-12)
+        assert s.certificate.cone_violation <= 1e-15

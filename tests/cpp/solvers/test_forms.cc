@@ -115,6 +115,8 @@ TEST(BadBlocksAreNamed) {
   CHECK_THROWS(p.validate(), ModelError, "block_starts runs from 0 to");
   p = good, p.block_starts[2] = p.block_starts[1] - 1;
   CHECK_THROWS(p.validate(), ModelError, "block_starts[2] is");
+  p = good, p.block_starts[1] = 1000;  // beyond the columns: named before anything is read there
+  CHECK_THROWS(p.validate(), ModelError, "block_starts[2] is");
   p = good, p.block_columns[1] = 9;
   CHECK_THROWS(p.validate(), ModelError, "block_columns[1] is 9; it must lie in [0, 4)");
   p = good, p.block_columns[1] = p.block_columns[0];
@@ -145,4 +147,10 @@ TEST(LargeIndefiniteProblemsAreRefused) {
     if (p.block_columns[k] == 40)
       for (int r = 0; r < 3; ++r) p.delassus[9 * std::size_t(k) + 4 * r] *= 0.01;
   CHECK_THROWS(p.validate(), ModelError, "indefinite: it has an eigenvalue below -");
+}
+
+TEST(AnEmptyBlockSparseProblemIsSolved) {
+  ContactProblem p;
+  p.block_starts = {0};
+  CHECK(solve(p).status == SolveStatus::kConverged);
 }

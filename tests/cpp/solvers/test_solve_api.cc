@@ -41,6 +41,11 @@ TEST(BadProblemsAreNamedWithTheirFirstOffendingEntry) {
   CHECK_THROWS(p.validate(), ModelError, "indefinite");
   p = block(), p.free_velocity[2] = kInfinity;
   CHECK_THROWS(p.validate(), ModelError, "free_velocity[2] is inf");
+  p = block(), p.free_velocity[2] = 1e80;
+  CHECK_THROWS(p.validate(), ModelError, "free_velocity has a largest entry of 1e+80 m/s");
+  p = block();
+  for (double& g : p.delassus) g *= 1e-80;
+  CHECK_THROWS(p.validate(), ModelError, "it must be 0 or lie in [1e-75, 1e+75]");
   p = block(), p.friction[0] = -0.1;
   CHECK_THROWS(p.validate(), ModelError, "friction[0] is -0.1");
   p = block(), p.friction[0] = kNan;
