@@ -32,11 +32,12 @@ Source stacks(const char* name, double mass_ratio) {
 const std::vector<Source>& sources() {
   static const std::vector<Source> all = {
       family("quadruped_standing", "4 feet", 1000),
-      family("quadruped_trotting", "4 feet", 1000),
       family("quadruped_impact", "4 feet", 1000),
+      family("quadruped_trotting", "2 to 4 feet", 1000),
       family("eight_contacts_resting", "8 contacts", 1000),
       family("eight_contacts_impact", "8 contacts", 1000),
       family("duplicated_contacts", "duplicated", 200),
+      family("ill_conditioned", "ill-conditioned", 100),
       stacks("box_stack_1", 1),
       stacks("box_stack_1e2", 1e2),
       stacks("box_stack_1e4", 1e4),

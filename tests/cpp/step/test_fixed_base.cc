@@ -146,3 +146,26 @@ TEST(AFixedBaseWithoutJointsHasNoEnergyToBeWrongAbout) {
   CHECK(robot.kinetic_energy() == 0 && robot.mechanical_energy() == 0);
   CHECK(robot.angular_momentum()[0] == 0 && robot.center_of_mass()[2] == 0);
 }
+
+TEST(AStepDoesNotHideAContactThatCannotPush) {
+  // A slider along the ground that starts in it: nothing moves it out, and the status says so.
+  ModelBuilder builder("cart");
+  builder.add_link("base");
+  Inertial in;
+  in.mass = 1, in.inertia = {0.01, 0, 0, 0.01, 0, 0.01};
+  builder.add_link("cart", in);
+  LinkJoint joint;
+  joint.name = "slide", joint.type = LinkJointType::kPrismatic;
+  joint.parent = "base", joint.child = "cart", joint.axis = {1, 0, 0};
+  builder.add_joint(joint);
+  Shape ball;
+  ball.size = {0.05, 0, 0};
+  builder.add_shape("cart", ball);
+  World world(options(Integrator::kEnergySafe, 1e-3));
+  world.add_ground();
+  RobotOptions where;
+  where.position = {0, 0, 0.04};
+  const Robot& robot = world.add_robot(builder.build(BaseType::kFixed), where);
+  CHECK(world.step() == StepStatus::kNotConverged);
+  CHECK(robot.info().contacts == 1 && robot.info().residual > 1e-5);
+}
