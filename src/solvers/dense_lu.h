@@ -19,27 +19,30 @@ inline int pivot_row(const double* a, int m, int stride, int j) {
 inline constexpr int kRowChunk = 4;
 constexpr int padded_row(int columns) { return (columns + kRowChunk - 1) / kRowChunk * kRowChunk; }
 
+inline Pack<double, kRowChunk> load_row(const double* from) {
+  Pack<double, kRowChunk> c;
+  __builtin_memcpy(&c, from, sizeof c);
+  return c;
+}
+inline void store_row(double* to, const Pack<double, kRowChunk>& c) {
+  __builtin_memcpy(to, &c, sizeof c);
+}
+
 /// x with A x = b, for the (m, m + 1) matrix [A, b] with rows `stride` = padded_row(m + 1) apart,
 /// which it destroys. Columns left of the pivot are dead, so every update may start at a whole
 /// chunk. A column without a pivot gets a tiny one: x is then huge or not finite, and the caller
 /// rejects it.
 inline void eliminate(double* a, int m, int stride, double* x) {
   using Chunk = Pack<double, kRowChunk>;
-  const auto load = [](const double* from) {
-    Chunk c;
-    __builtin_memcpy(&c, from, sizeof c);
-    return c;
-  };
-  const auto store = [](double* to, const Chunk& c) { __builtin_memcpy(to, &c, sizeof c); };
   for (int j = 0; j < m; ++j) {
     double* top = a + long(j) * stride;
     const int first = j / kRowChunk * kRowChunk;
     if (const int p = pivot_row(a, m, stride, j); p != j) {
       double* other = a + long(p) * stride;
       for (int k = first; k <= m; k += kRowChunk) {
-        const Chunk t = load(top + k);
-        store(top + k, load(other + k));
-        store(other + k, t);
+        const Chunk t = load_row(top + k);
+        store_row(top + k, load_row(other + k));
+        store_row(other + k, t);
       }
     }
     if (!(abs(top[j]) > 1e-300)) top[j] = 1e-300;
@@ -49,7 +52,7 @@ inline void eliminate(double* a, int m, int stride, double* x) {
       double* row = a + long(i) * stride;
       const Chunk f(-(row[j] * inverse));
       for (int k = next; k <= m; k += kRowChunk)
-        store(row + k, madd(load(top + k), f, load(row + k)));
+        store_row(row + k, madd(load_row(top + k), f, load_row(row + k)));
     }
   }
   for (int i = m - 1; i >= 0; --i) {

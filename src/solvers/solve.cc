@@ -194,8 +194,9 @@ SolveResult solve_checked(const ContactProblem& problem, const SolveOptions& opt
   if (!warm_start.empty() || n == 0 || options.method != SolveMethod::kAuto)
     offer_starts(e.view, best, warm_start);
   if (!(best.solved() && by_residual)) run_method(e.view, options, best, effort, &memory);
-  // Everything reported is recomputed from the impulse that is returned.
-  best.restore(e.view);
+  // Everything reported is recomputed from the impulse that is returned. The chain stops at the one
+  // that solves.
+  if (!(best.solved() && options.method == SolveMethod::kAuto)) best.restore(e.view);
   if (options.minimum_norm)
     improve(e.view, std::max(tolerance, best.residual()), [&] {
       minimize_tangential_impulses(e.view, std::max(tolerance, 10 * best.residual()));

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "solvers/block_system.h"
+#include "solvers/dense_lu.h"
 #include "solvers/explicit_view.h"
 #include "solvers/large_system.h"
 
@@ -172,17 +173,24 @@ void check_block_sparse(const ContactProblem& p, int n) {
 /// Cholesky of G + shift, on the upper triangle, for problems of robot size. The first row without
 /// a positive pivot, or -1.
 int first_bad_pivot(const std::vector<double>& G, int m, double shift) {
-  std::vector<double> u(G);
+  using solvers::kRowChunk;
+  using Chunk = Pack<double, kRowChunk>;
+  const int stride = solvers::padded_row(m);
+  std::vector<double> u(std::size_t(m) * stride);
+  for (int i = 0; i < m; ++i)
+    std::copy_n(G.data() + std::size_t(i) * m, m, u.data() + std::size_t(i) * stride);
   for (int j = 0; j < m; ++j) {
-    double* __restrict__ top = u.data() + std::size_t(j) * m;
+    const double* top = u.data() + std::size_t(j) * stride;
     const double pivot = top[j] + shift;
     if (!(pivot > 0)) return j;
-    const double inverse = 1 / pivot;
+    const double inverse = -1 / pivot;
     for (int i = j + 1; i < m; ++i) {
-      if (top[i] == 0) continue;
-      const double f = -top[i] * inverse;
-      double* __restrict__ row = u.data() + std::size_t(i) * m;
-      for (int k = i; k < m; ++k) row[k] = madd(f, top[k], row[k]);
+      const Chunk f(top[i] * inverse);
+      double* row = u.data() + std::size_t(i) * stride;
+      // Whole chunks: what lies left of the diagonal is not used.
+      for (int k = i / kRowChunk * kRowChunk; k < m; k += kRowChunk)
+        solvers::store_row(row + k,
+                           madd(f, solvers::load_row(top + k), solvers::load_row(row + k)));
     }
   }
   return -1;
