@@ -6,6 +6,8 @@ Per contact the order is x, y (tangential), z (normal); batches come first: G (N
 
 from __future__ import annotations
 
+import itertools
+
 import clarabel
 import numpy as np
 import scipy.sparse as sp
@@ -239,6 +241,29 @@ def dissipation_by_search(G, c, mu):
     turn = np.full((len(k), 1), np.pi, dtype=Real)
     angle, _ = search(slide_energy, -turn, turn, points=1441)
     out[slips] = sliding_impulse(g, k, m, angle)[:, 0]
+    return out
+
+
+def planar_solutions(G, c, mu) -> list[np.ndarray]:
+    """All impulses (2n,) of a problem in the plane, G (2n, 2n) definite, in the order x, z: one linear system per choice of
+    open, stick and the two slips of each contact, 4^n of them."""
+    G, c, mu, n = np.asarray(G, float), np.asarray(c, float), np.asarray(capped(mu), float), len(mu)
+    out = []
+    for modes in itertools.product(("open", "stick", 1, -1), repeat=n):
+        # Impulses are E a: per contact none, both components, or a_z (-side mu, 1) where it slides to this side.
+        columns, rows = [], []
+        for i, mode in enumerate(modes):
+            x, z = np.eye(2 * n)[2 * i : 2 * i + 2]
+            columns += [] if mode == "open" else [x, z] if mode == "stick" else [z - mode * mu[i] * x]
+            rows += [] if mode == "open" else [x, z] if mode == "stick" else [z]
+        impulse = np.zeros(2 * n)
+        if columns:
+            E, held = np.array(columns).T, np.array(rows)
+            impulse = E @ np.linalg.solve(held @ G @ E, -held @ c)
+        (vx, vz), (x, z) = (G @ impulse + c).reshape(n, 2).T, impulse.reshape(n, 2).T
+        side = np.array([0 if isinstance(m, str) else m for m in modes])
+        if (vz >= -1e-12).all() and (z >= 0).all() and (np.abs(x) <= mu * z + 1e-12).all() and (side * vx >= 0).all():
+            out.append(impulse)
     return out
 
 
