@@ -244,15 +244,18 @@ def test_problems_without_anything_to_solve_can_be_drawn(tmp_path, capsys):
 
 def test_the_page_runs_and_names_every_option(tmp_path, monkeypatch, capsys):
     page = (Path(__file__).resolve().parents[2] / "docs" / "solve.md").read_text(encoding="utf-8")
-    (example,) = re.findall(r"```python\n(.*?)```", page, flags=re.S)
+    comparison, one_problem = re.findall(r"```python\n(.*?)```", page, flags=re.S)
     monkeypatch.chdir(tmp_path)
-    exec(compile(example, "docs/solve.md", "exec"), {})
+    exec(compile(comparison, "docs/solve.md", "exec"), {})
     assert capsys.readouterr().out.splitlines()[-2] == "auto 20 of 20"
     assert {path.name for path in tmp_path.iterdir()} == {"stacks.csv", "profile.png", "curves.png"}
+    QUADRUPED.save("landing.hdf5")
+    exec(compile(one_problem, "docs/solve.md", "exec"), {})
+    assert capsys.readouterr().out.startswith("converged ")
     with pytest.raises(SystemExit):
         cli.main(["solve", "--help"])
     options = set(re.findall(r"--[a-z][a-z-]+", capsys.readouterr().out)) - {"--help"}
-    assert options == set(re.findall(r"--[a-z][a-z-]+", page))
+    assert options == set(re.findall(r"(?<!\w)--[a-z][a-z-]+", page))
     assert all(f"`{method}`" in page for method in SOLVE_METHODS)
 
 
