@@ -93,7 +93,7 @@ def starts(draw):
             return None
         noise = rng.normal(size=3 * p.num_contacts) * impulse_size(p)
         if kind in ("random", "absurd"):
-            return np.clip(noise * 10.0**power, -1e300, 1e300)
+            return np.clip(noise, -1e140, 1e140) * 10.0**power
         x = ss.solve(p, tolerance=0, relative_tolerance=1e-9, max_sweeps=100).impulse
         return x if kind == "solution" else x * (1 + 10.0**power * rng.normal(size=len(x))) + 10.0**power * noise
 
@@ -139,7 +139,7 @@ def check_cones(p: ss.ContactProblem, impulse: np.ndarray):
     x, mu = impulse.reshape(-1, 3), np.minimum(p.friction, 1e4)
     t = np.hypot(x[:, 0], x[:, 1])
     assert (x[:, 2] >= 0).all(), x
-    assert (t <= mu * x[:, 2] * (1 + 1e-14) + 1e-160).all(), f"{x} leaves the cones of {mu}"
+    assert (t <= mu * x[:, 2] * (1 + 1e-13) + 1e-160).all(), f"{x} leaves the cones of {mu}"
 
 
 def check_max_dissipation(p: ss.ContactProblem, s: ss.ContactSolution, limit: float):
@@ -157,6 +157,16 @@ def check_max_dissipation(p: ss.ContactProblem, s: ss.ContactSolution, limit: fl
         assert v[i, 2] >= -allowed and (opens or stays or idle), f"contact {i}: v = {v[i]}, impulse = {x[i]}"
 
 
+def pushes(p: ss.ContactProblem) -> np.ndarray:
+    """(n,) Contacts that their own impulse moves along the normal. The others decide nothing: no impulse helps them."""
+    blocks = p.delassus.diagonal().reshape(-1, 3)
+    return blocks[:, 2] > 1e-12 * blocks.sum(1)
+
+
+def reachable_residual(p: ss.ContactProblem, impulse: np.ndarray, law: str) -> float:
+    return ss.residual(p, impulse, law)[pushes(p)].max(initial=0)
+
+
 def check_answer(p: ss.ContactProblem, s: ss.ContactSolution, limit: float, method: str = "auto", law: str = "coulomb"):
     """Finite, inside the cones, no worse than rest, and converged if and only if the oracle says so."""
     for a in (s.impulse, s.velocity, s.contact_residuals, [s.residual]):
@@ -166,13 +176,10 @@ def check_answer(p: ss.ContactProblem, s: ss.ContactSolution, limit: float, meth
     assert s.residual == s.contact_residuals.max(initial=0)
     assert s.converged == (s.residual <= limit) == (s.status == "converged")
     G = p.dense_delassus()
-    blocks = np.diagonal(G).reshape(-1, 3)
-    pushes = blocks[:, 2] > 1e-12 * blocks.sum(1)  # the others decide nothing: no impulse helps them
-    at_rest = ss.residual(p, np.zeros(3 * p.num_contacts), law=law)
     if method != "auto" or law == "coulomb":
-        assert s.contact_residuals[pushes].max(initial=0) <= max(at_rest[pushes].max(initial=0), limit)
+        assert reachable_residual(p, s.impulse, law) <= max(reachable_residual(p, 0 * s.impulse, law), limit)
     if s.status == "infeasible":
-        assert (~pushes & (s.velocity[2::3] < 0)).any()
+        assert (~pushes(p) & (s.velocity[2::3] < 0)).any()
     if law == "max_dissipation":
         if s.converged:
             check_max_dissipation(p, s, limit)
@@ -202,22 +209,27 @@ def test_every_method_answers_every_problem_with_a_true_status(p, start, options
 
 @hypothesis.given(p=problems(), choice=st.sampled_from(CHOICES), seed=st.integers(0, 2**32), power=st.integers(3, 160))
 @hypothesis.settings(max_examples=400, deadline=None, derandomize=True)
-def test_an_absurd_start_does_not_decide_whether_a_problem_is_solved(p, choice, seed, power):
-    """Absurd: a residual of more than a thousand times that of rest."""
+def test_an_absurd_start_gives_the_bits_of_a_start_from_rest(p, choice, seed, power):
+    """Absurd: more than a thousand times the residual of rest, over the contacts that can push."""
     method, law = choice
     start = np.random.default_rng(seed).normal(size=3 * p.num_contacts) * impulse_size(p)
-    start = np.clip(start * 10.0**power, -1e300, 1e300)
+    start = np.clip(start, -1e140, 1e140) * 10.0**power
     rest = np.zeros_like(start)
-    with_start, without = (
-        ss.solve(p, method, law, tolerance=0, relative_tolerance=1e-9, max_sweeps=100, impulse=x) for x in (start, None)
+    absurd, at_rest = (
+        ss.solve(p, method, law, tolerance=0, relative_tolerance=1e-9, max_sweeps=100, impulse=x) for x in (start, rest)
     )
-    check_answer(p, with_start, limit_of(p, 0, 1e-9), method, law)
-    if ss.residual(p, inside(p, start), law).max(initial=0) > 1.01e3 * ss.residual(p, rest, law).max(initial=0):
-        assert with_start.converged == without.converged
+    check_answer(p, absurd, limit_of(p, 0, 1e-9), method, law)
+    if reachable_residual(p, inside(p, start), law) > 1.01e3 * reachable_residual(p, rest, law):
+        np.testing.assert_array_equal(absurd.impulse, at_rest.impulse)
+        assert absurd.status == at_rest.status
 
 
 def inside(p: ss.ContactProblem, impulse: np.ndarray) -> np.ndarray:
-    return oracles.project(p.friction, impulse.reshape(-1, 3)).astype(float).reshape(-1)
+    """What a solve takes a start for: the tangential part shortened, nothing where a contact cannot push."""
+    x = np.where(pushes(p)[:, None], impulse.reshape(-1, 3), 0)
+    z, t = np.maximum(x[:, 2], 0), np.hypot(x[:, 0], x[:, 1])
+    shorter = np.minimum(1, np.minimum(p.friction, 1e4) * z / np.where(t > 0, t, 1))
+    return np.column_stack([x[:, 0] * shorter, x[:, 1] * shorter, z]).reshape(-1)
 
 
 # The ends of the range, nothing at all, no solution ------------------------------------------------------------------
