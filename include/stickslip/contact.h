@@ -114,8 +114,9 @@ struct SolveOptions {
   int max_sweeps = 1000;   ///< >= 1; kAuto: of each of its sweep stages
   int max_iterations = 0;  ///< Newton, interior-point or ADMM steps of a method chosen by name, >=
                            ///< 0; 0: 500, 100 or 5000
-  /// Among impulses with the same velocity, the one with the least tangential part (redundant
-  /// contacts leave a choice: feet that press against each other), (C70). kCoulomb only.
+  /// Redundant contacts leave a choice of impulses with the same velocity (feet that press against
+  /// each other, copies of a contact): spread them over the contacts at rest by least norm, then,
+  /// with the normal impulses held, take the least tangential ones, (C70). kCoulomb only.
   bool minimum_norm = false;
   /// kProxNewton: proximal weight of the first subproblem, relative to G_ii; > 0.
   double proximal_weight = 1e-3;

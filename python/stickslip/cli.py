@@ -72,7 +72,7 @@ def _add_solve(commands: argparse._SubParsersAction) -> None:
         metavar="N",
         help="limit of prox_newton, interior_point and admm (default: the method's own)",
     )
-    solve.add_argument("--minimum-norm", action="store_true", help="of equivalent impulses take the smallest")
+    solve.add_argument("--minimum-norm", action="store_true", help="of impulses with the same velocity take the least")
     solve.add_argument(
         "--plot",
         type=Path,

@@ -6,6 +6,7 @@ Coulomb's law at each contact. Per contact the order is x, y (tangential), z (no
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
@@ -32,12 +33,12 @@ SOLVE_METHODS: tuple[SolveMethod, ...] = get_args(SolveMethod)
 
 
 class ContactProblem:
-    """A contact problem, dense or block sparse.
+    """A contact problem, dense or block sparse; per contact the order is x, y (tangential), z (normal) everywhere.
 
     delassus: (3n, 3n) [1/kg], J M^-1 J^T, symmetric positive semidefinite: an array, or any SciPy sparse matrix, which is kept
         in blocks of 3 x 3.
     free_velocity: (3n,) [m/s], velocity of the contact points without contact impulses.
-    friction: (n,), zero or positive; infinite and huge values count as 1e4.
+    friction: (n,) or one number for all, zero or positive; infinite and huge values count as 1e4.
 
     A problem in the plane has rows (x, z) only: see `planar`. Raises ValueError that names the argument and its first offending
     entry.
@@ -45,6 +46,8 @@ class ContactProblem:
 
     def __init__(self, delassus: ArrayLike | sparse.sparray, free_velocity: ArrayLike, friction: ArrayLike):
         mu = _numbers("friction", friction)
+        if mu.ndim == 0:
+            mu = np.full(np.size(free_velocity) // 3, mu)
         if mu.ndim != 1:
             raise ValueError(f"friction has shape {mu.shape}; it must be (n,)")
         n = len(mu)
@@ -71,7 +74,10 @@ class ContactProblem:
 
         It is kept as a problem in space whose y rows are zero: impulses and velocities are (3n,) with y = 0.
         """
-        problem = cls(*planar_to_spatial(delassus, free_velocity, friction))
+        try:
+            problem = cls(*planar_to_spatial(delassus, free_velocity, friction))
+        except ValueError as error:
+            raise type(error)(_planar_places(str(error))) from None
         problem._dimension = 2
         return problem
 
@@ -134,9 +140,18 @@ class ContactProblem:
         return f"ContactProblem({form}{self.num_contacts} contacts)"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Certificate:
-    """How good an impulse is, from the problem and the impulse alone. Velocities are v = G impulse + c."""
+    """How good an impulse is, from the problem and the impulse alone. Velocities are v = G impulse + c.
+
+    residuals: (n,) residual of each contact [m/s], see `residual`; residual: the largest.
+    backward_errors: (n,) the least change of the contact's velocity that makes its impulse exact under Coulomb's law [m/s];
+        backward_error: the largest. "This impulse is the exact answer to a problem whose velocities differ by this."
+    penetration_speed: the largest approach speed -v_z that is left, or 0 [m/s].
+    cone_violation: the largest |impulse_T| - mu impulse_z, or 0 [N s].
+    direction_error: the largest angle between the friction of a sliding contact and the direction against its sliding [rad].
+    power: the largest |impulse . (v + mu |v_T| z)|, the energy that contact and friction add or take against the law [J].
+    """
 
     residuals: Array  #: (n,) residual of each contact [m/s], see `residual`
     backward_errors: (
@@ -152,11 +167,12 @@ class Certificate:
     power: float  #: the largest |impulse . (v + mu |v_T| z)|, zero at a solution [J]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class History:
     """How a solve came about: one entry per start, sweep, step or iteration (of islands solved apart, one each).
 
-    Empty unless asked for.
+    stage: (k) what was at work; residual: (k,) of the impulse at that point [m/s], which need not fall from entry to entry
+    (`np.minimum.accumulate(history.residual)` is the best so far); time: (k,) since the solve began [s]. Empty unless asked for.
     """
 
     stage: list[Stage]  #: (k)
@@ -167,10 +183,12 @@ class History:
         return len(self.stage)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class ContactSolution:
     """What `solve` returns: the best impulse found, and how good it is.
 
+    impulse: (3n,) [N s]; velocity: (3n,), G impulse + c [m/s]; certificate: how good it is; stage: what found it ("start" if
+        nothing better was found); sweeps, newton_steps, interior_point_steps, admm_iterations: what it took.
     status: what ended the solve; whatever it is, the impulse is finite and inside its cones, and the certificate true.
         "converged": the residual is within the tolerance.
         "iteration_limit": a method chosen by name used up its sweeps or iterations. Raise the limit, or use "auto".
@@ -205,6 +223,10 @@ class ContactSolution:
     def contact_residuals(self) -> Array:
         """(n,) [m/s]."""
         return self.certificate.residuals
+
+    def __repr__(self) -> str:
+        contacts = f"{len(self.contact_residuals)} contacts"
+        return f"ContactSolution({self.status}, {contacts}, stage {self.stage}, residual {self.residual:.3g} m/s)"
 
     @property
     def iterations(self) -> int:
@@ -243,8 +265,9 @@ def solve(
     max_sweeps: passes over all contacts; "auto": of each of its sweep stages.
     max_iterations: steps of "prox_newton" (None: 500), "interior_point" (100) or "admm" (5000).
     impulse: (3n,) start [N s]; "interior_point" starts from a point of its own.
-    minimum_norm: of the impulses with the same velocity, return the one with the least tangential part. Redundant contacts
-        leave a choice; without this it depends on the order of the contacts.
+    minimum_norm: redundant contacts leave a choice of impulses with the same velocity, which otherwise depends on the order of
+        the contacts: spread them over the contacts at rest by least norm, then, with the normal impulses held, take the
+        least tangential ones.
     proximal_weight: of the first subproblem of "prox_newton", relative to G_ii.
     shift: how the steps of "interior_point" treat De Saxce's shift mu |v_T|: linearized ("exact"), from the last iterate, or
         half way towards it. Alone it ends near 1e-7 where contacts slide: "auto" goes on from there with Newton steps.
@@ -376,6 +399,17 @@ def _blocks(matrix: sparse.sparray, n: int) -> sparse.bsr_array:
     return blocks
 
 
+def _planar_places(text: str) -> str:
+    """An error text about a problem in space with its rows counted in the plane: 3 k becomes 2 k, 3 k + 2 becomes 2 k + 1."""
+
+    def place(match: re.Match[str]) -> str:
+        row, column = (2 * (int(k) // 3) + (int(k) % 3 > 0) for k in match.groups())
+        return f"[{row}, {column}]"
+
+    text = re.sub(r"\[(\d+), (\d+)\](?! \()", place, text)
+    return re.sub(r"columns 0 to (\d+)", lambda m: f"columns 0 to {2 * (int(m[1]) // 3) + (int(m[1]) % 3 > 0)}", text)
+
+
 def _unpickled(delassus: Any, free_velocity: Array, friction: Array, dimension: int) -> ContactProblem:
     problem = ContactProblem(delassus, free_velocity, friction)
     problem._dimension = dimension
@@ -407,5 +441,7 @@ def _shaped(name: str, value: ArrayLike, shape: tuple[int, ...], contacts: int |
     result = _numbers(name, value)
     if result.shape != shape:
         reason = "" if contacts is None else f" for {contacts} contacts (as many as friction has)"
+        if contacts and result.shape == tuple(2 * k // 3 for k in shape):
+            reason += "; problems in the plane are made by ContactProblem.planar"
         raise ValueError(f"{name} has shape {result.shape}; it must be {shape}{reason}")
     return result

@@ -101,6 +101,11 @@ class Recorder:
 def _pattern(path: str) -> str:
     """The pattern of file names that a folder or a pattern stands for."""
     if "{" not in path and "}" not in path:
+        if path.endswith((".hdf5", ".h5")):
+            raise ValueError(
+                f"path is {path!r}: one file cannot hold the problems of several steps; give a folder, or put {{number}} into "
+                "the name, as in '{number:06d}.hdf5'"
+            )
         if os.path.exists(path) and not os.path.isdir(path):
             raise NotADirectoryError(f"{path}: is a file; give a folder, or a pattern with {{number}}")
         os.makedirs(path, exist_ok=True)

@@ -41,6 +41,12 @@ double visit(ExplicitProblem& p, int i, double speed, double direction[2]) {
   return size * k.scale * k.scale;
 }
 
+/// The best impulse of all stages may still be worse than none.
+void offer_rest(ExplicitProblem& p, BestImpulse& best) {
+  std::fill(p.lambda, p.lambda + 3 * p.n, 0.0);
+  best.offer(p, SolveStage::kStart);
+}
+
 class Chain {
  public:
   Chain(ExplicitProblem& p, BestImpulse& best, int max_sweeps, Effort& effort,
@@ -62,6 +68,8 @@ class Chain {
     // What is left is hyperstatic, ill-conditioned or large.
     if (separate_islands()) return;
     if (proximal_newton(best_.impulse(), 1e-3, steps(60))) return;
+    // On many contacts its iterations are cheap beside an interior-point step.
+    if (p_.n > kRobotSized && admm(admm_iterations() / 10)) return;
     for (const ShiftRule shift : {ShiftRule::kExact, ShiftRule::kLagged, ShiftRule::kDamped})
       if (interior_point(shift, steps(80))) return;
     if (admm(admm_iterations())) return;
@@ -70,9 +78,7 @@ class Chain {
       if (proximal_newton(best_.impulse(), alpha, steps(150))) return;
     }
     proximal_newton(Doubles(3 * p_.n), 1.0, steps(150));
-    // The best impulse may still be worse than none.
-    std::fill(p_.lambda, p_.lambda + 3 * p_.n, 0.0);
-    best_.offer(p_, SolveStage::kStart);
+    offer_rest(p_, best_);
   }
 
  private:
@@ -207,8 +213,9 @@ class Chain {
     return solved || polish();
   }
 
+  /// From rest: its start owes nothing to what the others have found, and it is often better so.
   bool admm(int iterations) {
-    best_.restore(p_);
+    std::fill(p_.lambda, p_.lambda + 3 * p_.n, 0.0);
     Admm method(p_);
     const bool solved = method.run(best_, iterations);
     effort_.admm_iterations += method.iterations();
@@ -235,6 +242,7 @@ void run_max_dissipation(ExplicitProblem& p, BestImpulse& best, int max_sweeps, 
     effort.sweeps += recorded_sweeps(p, o, best, false).sweeps;
     if (best.offer(p, SolveStage::kSweeps, true)) return;
   }
+  offer_rest(p, best);
 }
 
 }  // namespace

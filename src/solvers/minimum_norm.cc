@@ -4,74 +4,103 @@
 #include <cmath>
 #include <vector>
 
+#include "solvers/cones.h"
+
 namespace stickslip::solvers {
 namespace {
 
-constexpr int kRounds = 200;        // of projections; one where no cone is reached
+using Eigen::Index;
+using Eigen::VectorXd;
+
+constexpr int kRounds = 500;        // of projections; one where no set is reached
 constexpr double kSettled = 1e-15;  // change of a round, relative to the impulses
 constexpr double kRankTolerance =
     1e-11;  // pivots of G below this much of the largest count as zero
 
-bool sticks(const contact::ExplicitProblem& p, int i, double speed) {
-  const double *v = p.v + 3 * i, *l = p.lambda + 3 * i;
-  return l[2] > 0 && v[0] * v[0] + v[1] * v[1] <= speed * speed;
+/// Contacts whose velocity is zero, as far as `rows` of it count.
+std::vector<int> resting(const contact::ExplicitProblem& p, double speed, int rows) {
+  std::vector<int> out;
+  for (int i = 0; i < p.n; ++i) {
+    double square = 0;
+    for (int r = 0; r < rows; ++r) square += p.v[3 * i + r] * p.v[3 * i + r];
+    if (p.local[i].inv_zz > 0 && square <= speed * speed) out.push_back(i);
+  }
+  return out;
 }
 
-/// G between the tangential rows of these contacts.
-Eigen::MatrixXd tangential_block(const contact::ExplicitProblem& p, const std::vector<int>& stick) {
+/// G between the first `rows` rows of these contacts.
+Eigen::MatrixXd block_between(const contact::ExplicitProblem& p, const std::vector<int>& contacts,
+                              int rows) {
   std::vector<int> place(p.n, -1);
-  for (std::size_t a = 0; a < stick.size(); ++a) place[stick[a]] = int(a);
-  const Eigen::Index m = 2 * Eigen::Index(stick.size());
+  for (std::size_t a = 0; a < contacts.size(); ++a) place[contacts[a]] = int(a);
+  const Index m = rows * Index(contacts.size());
   Eigen::MatrixXd G = Eigen::MatrixXd::Zero(m, m);
-  for (std::size_t a = 0; a < stick.size(); ++a)
-    contact::for_each_block(p, stick[a], [&](int j, const double* g, int stride) {
+  for (std::size_t a = 0; a < contacts.size(); ++a)
+    contact::for_each_block(p, contacts[a], [&](int j, const double* g, int stride) {
       if (place[j] < 0) return;
-      for (int r = 0; r < 2; ++r)
-        for (int s = 0; s < 2; ++s)
-          G(2 * Eigen::Index(a) + r, 2 * place[j] + s) = g[r * stride + s];
+      for (int r = 0; r < rows; ++r)
+        for (int s = 0; s < rows; ++s)
+          G(rows * Index(a) + r, rows * place[j] + s) = g[r * stride + s];
     });
   return G;
 }
 
-}  // namespace
-
-// (C70). The answer is the projection of zero on {x : G x = G x0} and the friction discs, by
-// Dykstra's alternating projections. G is semidefinite, so what its tangential block does not see
-// no other row sees either.
-void minimize_tangential_impulses(contact::ExplicitProblem& p, double speed) {
-  std::vector<int> stick;
-  for (int i = 0; i < p.n; ++i)
-    if (sticks(p, i, speed)) stick.push_back(i);
-  if (stick.empty()) return;
-  const Eigen::MatrixXd G = tangential_block(p, stick);
-  const Eigen::Index m = G.rows();
+/// (C70): the projection of zero on {x : G x = G x0} and a convex set, by Dykstra's alternating
+/// projections; `project(x)` puts x into the set. G is semidefinite, so what this block of it does
+/// not see no other row sees either.
+template <class F>
+VectorXd least_norm(const Eigen::MatrixXd& G, const VectorXd& x0, F&& project) {
   Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> pseudo_inverse;
   pseudo_inverse.setThreshold(kRankTolerance);
   pseudo_inverse.compute(G);
-  if (pseudo_inverse.rank() == m) return;  // no choice
-  Eigen::VectorXd start(m), limit(m / 2);
-  for (Eigen::Index a = 0; a < m / 2; ++a) {
-    const double* l = p.lambda + 3 * stick[a];
-    start[2 * a] = l[0], start[2 * a + 1] = l[1];
-    limit[a] = p.local[stick[a]].mu * l[2];
-  }
-  const Eigen::VectorXd moved = G * start;
-  Eigen::VectorXd x = pseudo_inverse.solve(moved), correction = Eigen::VectorXd::Zero(m);
+  if (pseudo_inverse.rank() == G.rows()) return x0;  // no choice
+  const VectorXd moved = G * x0;
+  VectorXd x = pseudo_inverse.solve(moved), correction = VectorXd::Zero(x0.size());
   for (int round = 0; round < kRounds; ++round) {
-    const Eigen::VectorXd before = x, outside = x + correction;
-    for (Eigen::Index a = 0; a < m / 2; ++a) {
-      const double length = outside.segment<2>(2 * a).norm();
-      x.segment<2>(2 * a) =
-          outside.segment<2>(2 * a) * (length > limit[a] ? limit[a] / length : 1.0);
-    }
+    const VectorXd before = x, outside = x + correction;
+    x = outside;
+    project(x);
     correction = outside - x;
     if (correction.isZero(0)) break;
     x += pseudo_inverse.solve(moved - G * x);
     if ((x - before).norm() <= kSettled * x.norm()) break;
   }
-  for (Eigen::Index a = 0; a < m / 2; ++a)
-    for (int r = 0; r < 2; ++r) p.lambda[3 * stick[a] + r] = x[2 * a + r];
-  contact::refresh_velocity(p);
+  return x;
+}
+
+/// Replaces the first `rows` impulses of these contacts by those of least norm.
+template <class F>
+void minimize(contact::ExplicitProblem& p, const std::vector<int>& contacts, int rows,
+              F&& project) {
+  if (contacts.empty()) return;
+  VectorXd x(rows * Index(contacts.size()));
+  for (std::size_t a = 0; a < contacts.size(); ++a)
+    for (int r = 0; r < rows; ++r) x[rows * Index(a) + r] = p.lambda[3 * contacts[a] + r];
+  x = least_norm(block_between(p, contacts, rows), x, project);
+  for (std::size_t a = 0; a < contacts.size(); ++a)
+    for (int r = 0; r < rows; ++r) p.lambda[3 * contacts[a] + r] = x[rows * Index(a) + r];
+}
+
+}  // namespace
+
+void spread_impulses(contact::ExplicitProblem& p, double speed) {
+  const std::vector<int> contacts = resting(p, speed, 3);
+  minimize(p, contacts, 3, [&](VectorXd& x) {
+    for (std::size_t a = 0; a < contacts.size(); ++a)
+      project_on_cone(p.local[contacts[a]].mu, x.data() + 3 * a);
+  });
+}
+
+void minimize_tangential_impulses(contact::ExplicitProblem& p, double speed) {
+  const std::vector<int> contacts = resting(p, speed, 2);
+  minimize(p, contacts, 2, [&](VectorXd& x) {
+    for (std::size_t a = 0; a < contacts.size(); ++a) {
+      auto tangential = x.segment<2>(2 * Index(a));
+      const double length = tangential.norm();
+      const double limit = p.local[contacts[a]].mu * p.lambda[3 * contacts[a] + 2];
+      if (length > limit) tangential *= limit / length;
+    }
+  });
 }
 
 }  // namespace stickslip::solvers

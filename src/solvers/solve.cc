@@ -197,10 +197,12 @@ SolveResult solve_checked(const ContactProblem& problem, const SolveOptions& opt
   // Everything reported is recomputed from the impulse that is returned. The chain stops at the one
   // that solves.
   if (!(best.solved() && options.method == SolveMethod::kAuto)) best.restore(e.view);
-  if (options.minimum_norm)
-    improve(e.view, std::max(tolerance, best.residual()), [&] {
-      minimize_tangential_impulses(e.view, std::max(tolerance, 10 * best.residual()));
-    });
+  if (options.minimum_norm) {
+    const double allowed = std::max(tolerance, best.residual());
+    const double speed = std::max(tolerance, 10 * best.residual());
+    improve(e.view, allowed, [&] { spread_impulses(e.view, speed); });
+    improve(e.view, allowed, [&] { minimize_tangential_impulses(e.view, speed); });
+  }
   r.certificate = max_dissipation || best.stage() == SolveStage::kStart
                       ? certify(e.view, max_dissipation)
                       : settled_certificate(e.view, tolerance, best.residual());

@@ -18,7 +18,7 @@
 namespace stickslip {
 namespace {
 
-constexpr double kSmallest = 1e-75, kLargest = 1e75;  // of operators and velocities
+constexpr double kSmallest = 1e-40, kLargest = 1e40;  // of operators and velocities
 constexpr double kAsymmetry = 1e-9;                   // of the largest entry: rounding
 constexpr double kIndefinite =
     1e-6;  // of the largest diagonal entry: rounding, also of files in text

@@ -7,6 +7,8 @@ directions of the tangential axes, storage) and expects the same velocity.
 
 from __future__ import annotations
 
+import itertools
+
 import hypothesis
 import numpy as np
 import pytest
@@ -19,7 +21,7 @@ from oracles import Real, norm
 
 FRICTION = st.one_of(st.sampled_from([0.0, 0.3, 0.8, 1e6, np.inf]), st.floats(1e-12, 3), st.floats(1e-12, 1e9))
 UNITS = st.one_of(st.sampled_from([0, 0, 0, -6, -1, 1, 6]), st.integers(-25, 25))  # powers of ten
-SMALLEST, LARGEST = 1e-75, 1e75  # of the largest entries of G and c, where they are not zero
+SMALLEST, LARGEST = 1e-40, 1e40  # of the largest entries of G and c, where they are not zero
 FORMS = {"dense": np.asarray, "csr": sp.csr_array, "bsr": lambda G: sp.bsr_array(G, blocksize=(3, 3))}
 IN_PLANE = {"planar": np.asarray, "planar csr": sp.csr_array}
 
@@ -176,8 +178,7 @@ def check_answer(p: ss.ContactProblem, s: ss.ContactSolution, limit: float, meth
     assert s.residual == s.contact_residuals.max(initial=0)
     assert s.converged == (s.residual <= limit) == (s.status == "converged")
     G = p.dense_delassus()
-    if method != "auto" or law == "coulomb":
-        assert reachable_residual(p, s.impulse, law) <= max(reachable_residual(p, 0 * s.impulse, law), limit)
+    assert reachable_residual(p, s.impulse, law) <= max(reachable_residual(p, 0 * s.impulse, law), limit)
     if s.status == "infeasible":
         assert (~pushes(p) & (s.velocity[2::3] < 0)).any()
     if law == "max_dissipation":
@@ -267,7 +268,7 @@ def test_problems_beyond_the_ends_of_the_range_raise_with_the_argument(form):
             ((size, 1.0), "delassus has a largest entry"),
             ((1.0, size), "free_velocity has a largest"),
         ]:
-            with pytest.raises(ValueError, match=rf"ContactProblem\.{text}.*it must be 0 or lie in \[1e-75, 1e\+75\]"):
+            with pytest.raises(ValueError, match=rf"ContactProblem\.{text}.*it must be 0 or lie in \[1e-40, 1e\+40\]"):
                 built(
                     form,
                     scaled_to(np.eye(6), sizes[0]),
@@ -281,13 +282,13 @@ def test_single_contacts_at_the_ends_of_the_range_are_solved():
     G, c = scaled_to(G, 1.0), scaled_to(c, 1.0)
     expected = ss.solve_contact(G, c, mu[0])
     assert norm(expected) > 0
-    for a, b in [(SMALLEST, SMALLEST), (SMALLEST, LARGEST), (LARGEST, LARGEST), (1e50, 1e-50)]:
+    for a, b in itertools.product([SMALLEST, 1.0, LARGEST], repeat=2):
         np.testing.assert_allclose(ss.solve_contact(G * a, c * b, mu[0]) * (a / b), expected, rtol=1e-8)
     for a, b, text in [
-        (1e76, 1, "delassus"),
-        (1e-76, 1, "delassus"),
-        (1, 1e76, "free_velocity"),
-        (1, 1e-76, "free_velocity"),
+        (1e41, 1, "delassus"),
+        (1e-41, 1, "delassus"),
+        (1, 1e41, "free_velocity"),
+        (1, 1e-41, "free_velocity"),
     ]:
         with pytest.raises(ValueError, match=f"{text} has a largest entry"):
             ss.solve_contact(G * a, c * b, mu[0])

@@ -211,5 +211,5 @@ TEST(FullProblemsThatNothingSolvesEndInTime) {
     for (int j = 0; j < m; ++j) p.delassus[i * m + j] = y[i] * y[j];
   }
   const SolveResult r = solve(p);
-  CHECK(r.status == SolveStatus::kStalled && r.admm_iterations <= 10000);
+  CHECK(r.status == SolveStatus::kStalled && r.admm_iterations <= 11000);
 }

