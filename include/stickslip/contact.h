@@ -116,7 +116,8 @@ struct SolveOptions {
                            ///< 0; 0: 500, 100 or 5000
   /// Redundant contacts leave a choice of impulses with the same velocity (feet that press against
   /// each other, copies of a contact): spread them over the contacts at rest by least norm, then,
-  /// with the normal impulses held, take the least tangential ones, (C70). kCoulomb only.
+  /// with the normal impulses held, take the least tangential ones, (C70). Where the problem is
+  /// solved, island by island of up to 500 contacts. kCoulomb only.
   bool minimum_norm = false;
   /// kProxNewton: proximal weight of the first subproblem, relative to G_ii; > 0.
   double proximal_weight = 1e-3;

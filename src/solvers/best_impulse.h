@@ -64,7 +64,7 @@ class BestImpulse {
   /// Takes p.lambda whatever it is worth: the answers of islands, none of which is worse than what
   /// it replaces.
   void replace(contact::ExplicitProblem& p, SolveStage stage) {
-    residual_ = __builtin_inf();
+    has_one_ = false;
     offer(p, stage);
   }
   void record(SolveStage stage, double residual) {

@@ -86,8 +86,8 @@ class Chain {
   /// factorization of a full matrix costs with the cube of its rows; block-sparse ones cost far
   /// less.
   int steps(int most) const {
-    if (p_.starts || p_.n <= kRobotSized) return most;
-    const double rows = 3.0 * p_.n;
+    const double all = double(p_.n) * p_.n, rows = 3.0 * p_.n;
+    if (p_.n <= kRobotSized || (p_.starts && p_.starts[p_.n] < 0.5 * all)) return most;
     return std::max(8, int(most * std::min(1.0, 1e8 / (rows * rows * rows))));
   }
   /// An iteration costs two triangular solves and one product.
@@ -105,13 +105,14 @@ class Chain {
     best_.restore(p_);
     const std::vector<double> start(p_.lambda, p_.lambda + 3 * p_.n);
     std::vector<double> composed = start;
-    SolveStage stage = best_.stage();
+    const SolveStage began = best_.stage();
+    SolveStage stage = began;
     for (int k = 0; k < islands.count(); ++k) {
       const std::vector<int> contacts = islands.contacts(k);
       if (is_solved(contacts)) continue;
       const Island island(p_, contacts);
       BestImpulse best(best_.tolerance(), false, nullptr);
-      best.offer(island.view(), stage);  // so that no island ends worse than it began
+      best.offer(island.view(), began);  // so that no island ends worse than it began
       Chain(island.view(), best, max_sweeps_, effort_).run();
       stage = std::max(stage, best.stage());
       for (std::size_t a = 0; a < contacts.size(); ++a)
@@ -237,7 +238,7 @@ void run_max_dissipation(ExplicitProblem& p, BestImpulse& best, int max_sweeps, 
   o.tolerance = best.tolerance();
   o.max_sweeps = max_sweeps;
   for (const double alpha : {1.0, 0.7}) {
-    if (!best.impulse().empty()) best.restore(p);
+    if (alpha < 1) best.restore(p);
     o.alpha = alpha;
     effort.sweeps += recorded_sweeps(p, o, best, false).sweeps;
     if (best.offer(p, SolveStage::kSweeps, true)) return;

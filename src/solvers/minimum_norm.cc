@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "solvers/cones.h"
+#include "solvers/islands.h"
 
 namespace stickslip::solvers {
 namespace {
@@ -13,14 +14,16 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 constexpr int kRounds = 500;        // of projections; one where no set is reached
-constexpr double kSettled = 1e-15;  // change of a round, relative to the impulses
+constexpr double kSettled = 1e-14;  // distance of the two sets' points, relative to them
+constexpr int kMostContacts = 500;  // of an island: its matrix is dense here
 constexpr double kRankTolerance =
     1e-11;  // pivots of G below this much of the largest count as zero
 
-/// Contacts whose velocity is zero, as far as `rows` of it count.
-std::vector<int> resting(const contact::ExplicitProblem& p, double speed, int rows) {
+/// Those contacts whose velocity is zero, as far as `rows` of it count.
+std::vector<int> resting(const contact::ExplicitProblem& p, const std::vector<int>& of,
+                         double speed, int rows) {
   std::vector<int> out;
-  for (int i = 0; i < p.n; ++i) {
+  for (const int i : of) {
     double square = 0;
     for (int r = 0; r < rows; ++r) square += p.v[3 * i + r] * p.v[3 * i + r];
     if (p.local[i].inv_zz > 0 && square <= speed * speed) out.push_back(i);
@@ -57,43 +60,51 @@ VectorXd least_norm(const Eigen::MatrixXd& G, const VectorXd& x0, F&& project) {
   const VectorXd moved = G * x0;
   VectorXd x = pseudo_inverse.solve(moved), correction = VectorXd::Zero(x0.size());
   for (int round = 0; round < kRounds; ++round) {
-    const VectorXd before = x, outside = x + correction;
-    x = outside;
-    project(x);
-    correction = outside - x;
-    if (correction.isZero(0)) break;
-    x += pseudo_inverse.solve(moved - G * x);
-    if ((x - before).norm() <= kSettled * x.norm()) break;
+    VectorXd inside = x + correction;
+    project(inside);
+    correction += x - inside;
+    x = inside + pseudo_inverse.solve(moved - G * inside);
+    if ((x - inside).norm() <= kSettled * x.norm()) return inside;  // in both sets
   }
+  project(x);
   return x;
 }
 
-/// Replaces the first `rows` impulses of these contacts by those of least norm.
+/// Replaces the first `rows` impulses of these contacts by those of least norm; `project(x,
+/// contacts)`.
 template <class F>
 void minimize(contact::ExplicitProblem& p, const std::vector<int>& contacts, int rows,
               F&& project) {
-  if (contacts.empty()) return;
   VectorXd x(rows * Index(contacts.size()));
   for (std::size_t a = 0; a < contacts.size(); ++a)
     for (int r = 0; r < rows; ++r) x[rows * Index(a) + r] = p.lambda[3 * contacts[a] + r];
-  x = least_norm(block_between(p, contacts, rows), x, project);
+  x = least_norm(block_between(p, contacts, rows), x, [&](VectorXd& to) { project(to, contacts); });
   for (std::size_t a = 0; a < contacts.size(); ++a)
     for (int r = 0; r < rows; ++r) p.lambda[3 * contacts[a] + r] = x[rows * Index(a) + r];
+}
+
+/// Island by island: what counts as zero in one says nothing of another.
+template <class F>
+void minimize_islands(contact::ExplicitProblem& p, double speed, int rows, F&& project) {
+  const Islands islands(p);
+  for (int k = 0; k < islands.count(); ++k) {
+    const std::vector<int> contacts = resting(p, islands.contacts(k), speed, rows);
+    if (!contacts.empty() && int(contacts.size()) <= kMostContacts)
+      minimize(p, contacts, rows, project);
+  }
 }
 
 }  // namespace
 
 void spread_impulses(contact::ExplicitProblem& p, double speed) {
-  const std::vector<int> contacts = resting(p, speed, 3);
-  minimize(p, contacts, 3, [&](VectorXd& x) {
+  minimize_islands(p, speed, 3, [&](VectorXd& x, const std::vector<int>& contacts) {
     for (std::size_t a = 0; a < contacts.size(); ++a)
       project_on_cone(p.local[contacts[a]].mu, x.data() + 3 * a);
   });
 }
 
 void minimize_tangential_impulses(contact::ExplicitProblem& p, double speed) {
-  const std::vector<int> contacts = resting(p, speed, 2);
-  minimize(p, contacts, 2, [&](VectorXd& x) {
+  minimize_islands(p, speed, 2, [&](VectorXd& x, const std::vector<int>& contacts) {
     for (std::size_t a = 0; a < contacts.size(); ++a) {
       auto tangential = x.segment<2>(2 * Index(a));
       const double length = tangential.norm();

@@ -127,27 +127,27 @@ SolveStatus status_of(const ExplicitProblem& p, const SolveOptions& o, const Eff
   return used_up(o, effort) ? SolveStatus::kIterationLimit : SolveStatus::kStalled;
 }
 
-/// Changes p.lambda by `change`, and back if the residual then exceeds `allowed`. p.v is up to date
-/// afterwards.
+/// Changes p.lambda by `change`, and back if the residual then exceeds the tolerance. p.v is up to
+/// date afterwards.
 template <class F>
-bool improve(ExplicitProblem& p, double allowed, F&& change) {
+bool improve(ExplicitProblem& p, double tolerance, F&& change) {
   const std::vector<double> kept(p.lambda, p.lambda + 3 * p.n);
   change();
+  solvers::project_on_cones(p);
   contact::refresh_velocity(p);
-  if (reachable_residual(p, false) <= allowed) return true;
+  if (reachable_residual(p, false) <= tolerance) return true;
   std::copy(kept.begin(), kept.end(), p.lambda);
   contact::refresh_velocity(p);
   return false;
 }
 
-/// The certificate of p.lambda. A method that approaches the cones from inside may leave contacts
-/// near to sliding or to opening, where the residual is small and the backward error is not: then
-/// they are settled, as long as the residual, `reached` before, stays within the tolerance.
-Certificate settled_certificate(ExplicitProblem& p, double tolerance, double reached) {
+/// The certificate of a solved p.lambda. A method that approaches the cones from inside may leave
+/// contacts near to sliding or to opening, where the residual is small and the backward error is
+/// not: then they are settled, as long as the residual stays within the tolerance.
+Certificate settled_certificate(ExplicitProblem& p, double tolerance) {
   Certificate c = solvers::certify(p, false);
   if (c.backward_error <= 2 * std::max(tolerance, c.residual)) return c;
-  if (improve(p, std::max(tolerance, reached), [&] { solvers::settle_on_cones(p); }))
-    c = solvers::certify(p, false);
+  if (improve(p, tolerance, [&] { solvers::settle_on_cones(p); })) c = solvers::certify(p, false);
   return c;
 }
 
@@ -158,8 +158,8 @@ void offer_starts(ExplicitProblem& p, BestImpulse& best, const std::vector<doubl
   if (!warm_start.empty() && best.offer(p, SolveStage::kStart)) return;
   const double warm = best.last_residual();
   std::fill(p.lambda, p.lambda + 3 * p.n, 0.0);
-  best.offer(p, SolveStage::kStart);
-  if (warm_start.empty() || !(warm <= kAbsurd * best.last_residual())) return;
+  if (best.offer(p, SolveStage::kStart) || warm_start.empty()) return;
+  if (!(warm <= kAbsurd * best.last_residual())) return;
   std::copy(warm_start.begin(), warm_start.end(), p.lambda);
   solvers::project_on_cones(p);
   contact::refresh_velocity(p);
@@ -196,16 +196,15 @@ SolveResult solve_checked(const ContactProblem& problem, const SolveOptions& opt
   if (!(best.solved() && by_residual)) run_method(e.view, options, best, effort, &memory);
   // Everything reported is recomputed from the impulse that is returned. The chain stops at the one
   // that solves.
-  if (!(best.solved() && options.method == SolveMethod::kAuto)) best.restore(e.view);
-  if (options.minimum_norm) {
-    const double allowed = std::max(tolerance, best.residual());
-    const double speed = std::max(tolerance, 10 * best.residual());
-    improve(e.view, allowed, [&] { spread_impulses(e.view, speed); });
-    improve(e.view, allowed, [&] { minimize_tangential_impulses(e.view, speed); });
+  const bool started = best.stage() == SolveStage::kStart;
+  if (!best.solved() || started || options.method != SolveMethod::kAuto) best.restore(e.view);
+  if (options.minimum_norm && best.solved()) {
+    improve(e.view, tolerance, [&] { spread_impulses(e.view, tolerance); });
+    improve(e.view, tolerance, [&] { minimize_tangential_impulses(e.view, tolerance); });
   }
-  r.certificate = max_dissipation || best.stage() == SolveStage::kStart
+  r.certificate = max_dissipation || started || !best.solved()
                       ? certify(e.view, max_dissipation)
-                      : settled_certificate(e.view, tolerance, best.residual());
+                      : settled_certificate(e.view, tolerance);
   r.velocity.assign(e.view.v, e.view.v + 3 * n);
   r.impulse.assign(e.view.lambda, e.view.lambda + 3 * n);
   r.stage = best.stage();

@@ -189,3 +189,50 @@ TEST(MinimumNormSharesTheLoadOfCopies) {
     }
   }
 }
+
+TEST(AWarmStartIsNotReturnedWhereRestSolves) {
+  const ContactProblem p{{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0, 0, -5e-10}, {0.5}};
+  for (const FrictionLaw law : {FrictionLaw::kCoulomb, FrictionLaw::kMaxDissipation}) {
+    SolveOptions o;
+    o.law = law;
+    const SolveResult r = solve(p, o, {0, 0, 2e-7});
+    CHECK(r.status == SolveStatus::kConverged && r.certificate.residual <= 1e-9);
+  }
+}
+
+TEST(MinimumNormStaysInsideTheConesAtAnyTolerance) {
+  for (const double tolerance : {1e-9, 1e-4, 1e-1})
+    for (int seed = 0; seed < 60; ++seed) {
+      SolveOptions o;
+      o.tolerance = tolerance, o.minimum_norm = true;
+      const SolveResult r = solve(scenes::random_problem("duplicated_contacts", seed), o);
+      double largest = 0;
+      for (std::size_t i = 2; i < r.impulse.size(); i += 3) {
+        CHECK(r.impulse[i] >= 0);
+        largest = std::max(largest, r.impulse[i]);
+      }
+      CHECK(r.certificate.cone_violation <= 1e-15 * largest);
+      CHECK(r.status == SolveStatus::kConverged);
+    }
+}
+
+TEST(MinimumNormSpreadsLoadsOfAnyWeightSideBySide) {
+  // Two cubes that do not touch, one of them 1e12 times as heavy.
+  const ContactProblem a = scenes::box_stack({1.0}, 0.5, 0.0);
+  const int m = 12;
+  ContactProblem both{std::vector<double>(4 * m * m), a.free_velocity, a.friction};
+  for (int i = 0; i < m; ++i)
+    for (int j = 0; j < m; ++j) {
+      both.delassus[i * 2 * m + j] = a.delassus[i * m + j];
+      both.delassus[(m + i) * 2 * m + m + j] = a.delassus[i * m + j] / 1e12;
+    }
+  both.free_velocity.insert(both.free_velocity.end(), a.free_velocity.begin(),
+                            a.free_velocity.end());
+  both.friction.insert(both.friction.end(), a.friction.begin(), a.friction.end());
+  SolveOptions o;
+  o.minimum_norm = true;
+  const SolveResult r = solve(both, o);
+  CHECK(r.status == SolveStatus::kConverged);
+  for (int i = 0; i < 8; ++i)
+    CHECK_NEAR(r.impulse[3 * i + 2] / (i < 4 ? 1 : 1e12), 9.81e-3 / 4, 1e-9);
+}
