@@ -16,7 +16,7 @@
 #pragma once
 #include "contact/slip.h"
 
-namespace stickslip::contact {
+namespace stickslip::contact::inline STICKSLIP_KERNELS {
 
 /// beta_1..3 of Algorithm 1. The paper does not print its values; these are the ones in use since.
 struct BisectionSteps {
@@ -97,4 +97,4 @@ inline SlipSolution solve_bisection(const SlipProblem& p, bool coulomb, double t
                        converged);
 }
 
-}  // namespace stickslip::contact
+}  // namespace stickslip::contact::inline STICKSLIP_KERNELS

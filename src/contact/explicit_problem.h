@@ -8,7 +8,7 @@
 #include "contact/residual.h"
 #include "contact/single.h"
 
-namespace stickslip::contact {
+namespace stickslip::contact::inline STICKSLIP_KERNELS {
 
 struct ExplicitProblem {
   int n = 0;                   // contacts
@@ -284,4 +284,4 @@ inline bool end_sweep(ExplicitProblem& p, const SweepOptions& o, double updates,
   return r.converged || !(r.error < 1e300);
 }
 
-}  // namespace stickslip::contact
+}  // namespace stickslip::contact::inline STICKSLIP_KERNELS

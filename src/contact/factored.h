@@ -10,7 +10,7 @@
 #pragma once
 #include "contact/jam.h"
 
-namespace stickslip::contact {
+namespace stickslip::contact::inline STICKSLIP_KERNELS {
 
 struct FactoredOptions {
   bool max_dissipation = false;
@@ -284,4 +284,4 @@ FactoredInfo<S> solve_factored(FactoredProblem<S>& p,
   return info;
 }
 
-}  // namespace stickslip::contact
+}  // namespace stickslip::contact::inline STICKSLIP_KERNELS

@@ -18,7 +18,7 @@
 // of compilation and gains nothing, a call being a nanosecond.
 #define STICKSLIP_STAGE inline __attribute__((noinline))
 
-namespace stickslip::contact {
+namespace stickslip::contact::inline STICKSLIP_KERNELS {
 
 /// Shared dofs handled by one operation.
 template <class S, bool kPlain = ScalarTraits<S>::kWidth == 1>
@@ -291,4 +291,4 @@ STICKSLIP_INLINE void reset_direction(FactoredContact<S>& c, const S l[3]) {
   c.direction[1] = l[1] * inv;
 }
 
-}  // namespace stickslip::contact
+}  // namespace stickslip::contact::inline STICKSLIP_KERNELS

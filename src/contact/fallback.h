@@ -8,7 +8,7 @@
 #pragma once
 #include "contact/newton.h"
 
-namespace stickslip::contact {
+namespace stickslip::contact::inline STICKSLIP_KERNELS {
 
 template <int M>
 class Fallback {
@@ -186,4 +186,4 @@ class Fallback {
   int steps_ = 0;
 };
 
-}  // namespace stickslip::contact
+}  // namespace stickslip::contact::inline STICKSLIP_KERNELS

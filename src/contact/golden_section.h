@@ -9,7 +9,7 @@
 #pragma once
 #include "contact/slip.h"
 
-namespace stickslip::contact {
+namespace stickslip::contact::inline STICKSLIP_KERNELS {
 
 /// An arc of angles [left, right], right - left <= 2 pi [rad].
 struct Arc {
@@ -93,4 +93,4 @@ inline SlipSolution solve_golden_section(const SlipProblem& p, double tolerance)
       best.d > 0 && (converged || moved_left != moved_right) && tolerance > resolution);
 }
 
-}  // namespace stickslip::contact
+}  // namespace stickslip::contact::inline STICKSLIP_KERNELS

@@ -16,7 +16,7 @@
 #pragma once
 #include "contact/local.h"
 
-namespace stickslip::contact {
+namespace stickslip::contact::inline STICKSLIP_KERNELS {
 
 /// The quartic of one slipping contact in the basis (e0, J e0).
 template <class S>
@@ -266,4 +266,4 @@ STICKSLIP_INLINE void visit_slip(const LocalContact<S>& k, const Reduced<S>& r, 
   direction[1] = select(r.slip, dy, ey);
 }
 
-}  // namespace stickslip::contact
+}  // namespace stickslip::contact::inline STICKSLIP_KERNELS

@@ -5,7 +5,7 @@
 #pragma once
 #include "contact/fallback.h"
 
-namespace stickslip::contact {
+namespace stickslip::contact::inline STICKSLIP_KERNELS {
 
 /// What the impulses of a problem may be at most where it is not solved.
 template <class S>
@@ -144,4 +144,4 @@ class JamRelease {
   double tolerance_;
 };
 
-}  // namespace stickslip::contact
+}  // namespace stickslip::contact::inline STICKSLIP_KERNELS

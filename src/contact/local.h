@@ -8,7 +8,7 @@
 #pragma once
 #include "lane/lane.h"
 
-namespace stickslip::contact {
+namespace stickslip::contact::inline STICKSLIP_KERNELS {
 
 /// The 3x3 block of one contact and what is precomputed from it once per step. Fill the block and
 /// mu, then `prepare`.
@@ -100,4 +100,4 @@ STICKSLIP_INLINE void apply_block(const LocalContact<S>& k, const S d[3], S out[
   out[2] = madd(k.xz, d[0], madd(k.yz, d[1], k.zz * d[2]));
 }
 
-}  // namespace stickslip::contact
+}  // namespace stickslip::contact::inline STICKSLIP_KERNELS

@@ -4,7 +4,7 @@
 
 #include "contact/single.h"
 
-namespace stickslip::contact {
+namespace stickslip::contact::inline STICKSLIP_KERNELS {
 
 inline Method method_of(SingleContactMethod method) {
   switch (method) {
@@ -19,4 +19,4 @@ inline Method method_of(SingleContactMethod method) {
   }
 }
 
-}  // namespace stickslip::contact
+}  // namespace stickslip::contact::inline STICKSLIP_KERNELS

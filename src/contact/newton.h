@@ -11,7 +11,7 @@
 #pragma once
 #include "contact/sweep.h"
 
-namespace stickslip::contact {
+namespace stickslip::contact::inline STICKSLIP_KERNELS {
 
 /// What one contact brings into the step, and its elimination. T is S, or a pack of contacts of a
 /// plain scalar.
@@ -310,4 +310,4 @@ STICKSLIP_STAGE void newton_step(FactoredProblem<S>& p, Mask<S> live, S alpha) {
   }
 }
 
-}  // namespace stickslip::contact
+}  // namespace stickslip::contact::inline STICKSLIP_KERNELS

@@ -10,7 +10,7 @@
 #pragma once
 #include "contact/explicit_problem.h"
 
-namespace stickslip::contact {
+namespace stickslip::contact::inline STICKSLIP_KERNELS {
 
 template <Method method, bool kMaxDissipation>
 inline void per_contact_sweep(ExplicitProblem& p, double alpha, const SweepOptions& o,
@@ -58,4 +58,4 @@ inline SweepResult per_contact(ExplicitProblem& p, const SweepOptions& o) {
   return r;
 }
 
-}  // namespace stickslip::contact
+}  // namespace stickslip::contact::inline STICKSLIP_KERNELS

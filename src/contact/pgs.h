@@ -6,7 +6,7 @@
 #pragma once
 #include "contact/explicit_problem.h"
 
-namespace stickslip::contact {
+namespace stickslip::contact::inline STICKSLIP_KERNELS {
 
 inline void pgs_sweep(ExplicitProblem& p, double alpha, double& updates) {
   for (int i = 0; i < p.n; ++i) {
@@ -39,4 +39,4 @@ inline SweepResult pgs(ExplicitProblem& p, const SweepOptions& o) {
   return r;
 }
 
-}  // namespace stickslip::contact
+}  // namespace stickslip::contact::inline STICKSLIP_KERNELS

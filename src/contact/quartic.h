@@ -10,7 +10,7 @@
 #include "contact/halley.h"
 #include "contact/slip.h"
 
-namespace stickslip::contact {
+namespace stickslip::contact::inline STICKSLIP_KERNELS {
 
 /// Real roots of z^3 + c2 z^2 + c1 z + c0: the largest one.
 inline double largest_cubic_root(double c2, double c1, double c0) {
@@ -107,4 +107,4 @@ inline SlipSolution solve_quartic(const LocalContact<double>& k, const Reduced<d
   return slip_solution(p, best, 1, turn * speed <= tolerance);
 }
 
-}  // namespace stickslip::contact
+}  // namespace stickslip::contact::inline STICKSLIP_KERNELS

@@ -9,7 +9,7 @@
 #pragma once
 #include "contact/local.h"
 
-namespace stickslip::contact {
+namespace stickslip::contact::inline STICKSLIP_KERNELS {
 
 /// Squared natural-map residual of one contact [m^2/s^2] from its velocity [m/s] and impulse [N s].
 /// Pure.
@@ -49,4 +49,4 @@ STICKSLIP_INLINE S impulse_rounding(const LocalContact<S>& k, const S lambda[3])
          sqrt(lambda[0] * lambda[0] + lambda[1] * lambda[1] + lambda[2] * lambda[2]);
 }
 
-}  // namespace stickslip::contact
+}  // namespace stickslip::contact::inline STICKSLIP_KERNELS

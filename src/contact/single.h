@@ -6,7 +6,7 @@
 #include "contact/halley.h"
 #include "contact/quartic.h"
 
-namespace stickslip::contact {
+namespace stickslip::contact::inline STICKSLIP_KERNELS {
 
 /// Evaluations at which solve_slip gives up (halley.h).
 inline constexpr int kHalleyCap = 80;
@@ -122,4 +122,4 @@ inline void with_method(Method method, bool max_dissipation, F&& f) {
   }
 }
 
-}  // namespace stickslip::contact
+}  // namespace stickslip::contact::inline STICKSLIP_KERNELS

@@ -9,7 +9,7 @@
 #include "contact/local.h"
 #include "lane/math.h"
 
-namespace stickslip::contact {
+namespace stickslip::contact::inline STICKSLIP_KERNELS {
 
 /// (C5)-(C8) for one sliding contact, and its stick impulse, which lies outside the cone.
 struct SlipProblem {
@@ -80,4 +80,4 @@ STICKSLIP_INLINE double sight_cosine(const SlipProblem& p) {
   return p.mu * p.stick_z / sqrt(p.stick_x * p.stick_x + p.stick_y * p.stick_y);
 }
 
-}  // namespace stickslip::contact
+}  // namespace stickslip::contact::inline STICKSLIP_KERNELS

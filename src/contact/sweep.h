@@ -11,7 +11,7 @@
 #include "contact/factored_problem.h"
 #include "contact/halley.h"
 
-namespace stickslip::contact {
+namespace stickslip::contact::inline STICKSLIP_KERNELS {
 
 /// Transposed rows in chunks, from the rows.
 template <int M, class S>
@@ -204,4 +204,4 @@ STICKSLIP_INLINE void set_impulse(FactoredContact<S>& c, const S l[3]) {
   update_base(c, l);
 }
 
-}  // namespace stickslip::contact
+}  // namespace stickslip::contact::inline STICKSLIP_KERNELS

@@ -3,7 +3,7 @@
 #pragma once
 #include "contact/factored_problem.h"
 
-namespace stickslip::contact {
+namespace stickslip::contact::inline STICKSLIP_KERNELS {
 
 /// G_ij = Y_i Y_j^T over the dofs that both touch, plus P_i where i = j; entries[r][s]: row s of i,
 /// row r of j.
@@ -69,4 +69,4 @@ inline void read_back(FactoredProblem<double>& p, const double* lambda, const do
   }
 }
 
-}  // namespace stickslip::contact
+}  // namespace stickslip::contact::inline STICKSLIP_KERNELS

@@ -4,7 +4,7 @@
 #pragma once
 #include "dynamics/kinematics.h"
 
-namespace stickslip::dynamics {
+namespace stickslip::dynamics::inline STICKSLIP_KERNELS {
 
 /// Sets every link's `force` to minus its inertial and gravity load at velocity (angular_velocity,
 /// rates), so that `solve_lower_transposed` turns it into L^-T (-h). Also leaves the link
@@ -52,4 +52,4 @@ void collect_joint_forces(Tree<S>& t, S* out) {
   }
 }
 
-}  // namespace stickslip::dynamics
+}  // namespace stickslip::dynamics::inline STICKSLIP_KERNELS

@@ -12,35 +12,11 @@
 #pragma once
 #include "lane/pack.h"
 
+// Plain data, the same for every instruction set.
 namespace stickslip::dynamics {
 
-constexpr int kMaxLanes = 4;
-constexpr int kBaseSlot = -1;  // parent slot of chains that hang on body 0
-
-/// Lanes of one robot's bundle kernels: four branches side by side for a plain scalar; a pack keeps
-/// its environments.
-template <class S>
-struct BundleScalar {
-  using Wide = S;
-  using Constant = Value<S>;
-  static constexpr int kLanes = 1;
-};
-template <>
-struct BundleScalar<double> {
-  using Wide = Pack<double, kMaxLanes>;
-  using Constant = Wide;
-  static constexpr int kLanes = kMaxLanes;
-};
-template <>
-struct BundleScalar<float> {
-  using Wide = Pack<float, kMaxLanes>;
-  using Constant = Wide;
-  static constexpr int kLanes = kMaxLanes;
-};
-template <class S>
-using Wide = typename BundleScalar<S>::Wide;
-template <class S>
-using WideConstant = typename BundleScalar<S>::Constant;
+inline constexpr int kMaxLanes = 4;
+inline constexpr int kBaseSlot = -1;  // parent slot of chains that hang on body 0
 
 /// Where a body sits: slot kBaseSlot is body 0.
 struct LinkIndex {
@@ -74,3 +50,32 @@ struct LinkConstants {
 };
 
 }  // namespace stickslip::dynamics
+
+namespace stickslip::dynamics::inline STICKSLIP_KERNELS {
+
+/// Lanes of one robot's bundle kernels: four branches side by side for a plain scalar; a pack keeps
+/// its environments.
+template <class S>
+struct BundleScalar {
+  using Wide = S;
+  using Constant = Value<S>;
+  static constexpr int kLanes = 1;
+};
+template <>
+struct BundleScalar<double> {
+  using Wide = Pack<double, kMaxLanes>;
+  using Constant = Wide;
+  static constexpr int kLanes = kMaxLanes;
+};
+template <>
+struct BundleScalar<float> {
+  using Wide = Pack<float, kMaxLanes>;
+  using Constant = Wide;
+  static constexpr int kLanes = kMaxLanes;
+};
+template <class S>
+using Wide = typename BundleScalar<S>::Wide;
+template <class S>
+using WideConstant = typename BundleScalar<S>::Constant;
+
+}  // namespace stickslip::dynamics::inline STICKSLIP_KERNELS

@@ -4,7 +4,7 @@
 #pragma once
 #include "dynamics/solve.h"
 
-namespace stickslip::dynamics {
+namespace stickslip::dynamics::inline STICKSLIP_KERNELS {
 
 /// Y of one contact: `joint[k]` is the column of the joint at `path[k]`, from the link to the base.
 template <class S>
@@ -67,4 +67,4 @@ STICKSLIP_INLINE void compute_row(const Tree<S>& t, LinkIndex link, const Vec3<S
   if (t.floating) solve_base_transposed(t.base, base);
 }
 
-}  // namespace stickslip::dynamics
+}  // namespace stickslip::dynamics::inline STICKSLIP_KERNELS

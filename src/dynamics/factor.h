@@ -7,7 +7,7 @@
 #pragma once
 #include "dynamics/kinematics.h"
 
-namespace stickslip::dynamics {
+namespace stickslip::dynamics::inline STICKSLIP_KERNELS {
 
 /// Factors the 6x6 of a floating base, rows linear then angular, last row first.
 template <class S>
@@ -67,4 +67,4 @@ void factor_mass_matrix(Tree<S>& t, const S* extra) {
   if (t.floating) factor_base(t.base);
 }
 
-}  // namespace stickslip::dynamics
+}  // namespace stickslip::dynamics::inline STICKSLIP_KERNELS

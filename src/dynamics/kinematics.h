@@ -4,7 +4,7 @@
 #include "dynamics/tree.h"
 #include "lane/math.h"
 
-namespace stickslip::dynamics {
+namespace stickslip::dynamics::inline STICKSLIP_KERNELS {
 
 /// Rotations, positions and joint axes of all links from the base quaternion (w x y z) and the
 /// joints (num_joints).
@@ -103,4 +103,4 @@ STICKSLIP_INLINE Vec3<S> point_velocity(const Tree<S>& t, LinkIndex link, const 
   return cross(v.ang, point, v.lin);
 }
 
-}  // namespace stickslip::dynamics
+}  // namespace stickslip::dynamics::inline STICKSLIP_KERNELS

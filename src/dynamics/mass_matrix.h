@@ -3,7 +3,7 @@
 #pragma once
 #include "dynamics/kinematics.h"
 
-namespace stickslip::dynamics {
+namespace stickslip::dynamics::inline STICKSLIP_KERNELS {
 
 /// Row-major (nu, nu) into `out`, after compute_positions and compute_inertias. `composites` is
 /// scratch (num_slots).
@@ -61,4 +61,4 @@ void compute_mass_matrix(const Tree<S>& t, RigidInertia<Wide<S>>* composites, S*
     for (int j = 0; j <= i; ++j) put(3 + i, 3 + j, rot[3 * i + j]);
 }
 
-}  // namespace stickslip::dynamics
+}  // namespace stickslip::dynamics::inline STICKSLIP_KERNELS

@@ -4,7 +4,7 @@
 #pragma once
 #include "dynamics/factor.h"
 
-namespace stickslip::dynamics {
+namespace stickslip::dynamics::inline STICKSLIP_KERNELS {
 
 template <class S>
 STICKSLIP_INLINE void to_rows(const Spatial<S>& f, S row[6]) {  // linear, angular: the order of u
@@ -156,4 +156,4 @@ Spatial<S> base_momentum(const Tree<S>& t) {
   return sum;
 }
 
-}  // namespace stickslip::dynamics
+}  // namespace stickslip::dynamics::inline STICKSLIP_KERNELS

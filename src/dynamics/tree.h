@@ -4,7 +4,7 @@
 #include "lane/row3.h"
 #include "spatial/spatial.h"
 
-namespace stickslip::dynamics {
+namespace stickslip::dynamics::inline STICKSLIP_KERNELS {
 
 /// What a step knows of the links of one slot; W holds one branch per lane. World axes, base origin
 /// as reference.
@@ -162,4 +162,4 @@ STICKSLIP_INLINE Mat3<W> wide_mat3(const K v[9]) {
   return {{W(v[0]), W(v[1]), W(v[2]), W(v[3]), W(v[4]), W(v[5]), W(v[6]), W(v[7]), W(v[8])}};
 }
 
-}  // namespace stickslip::dynamics
+}  // namespace stickslip::dynamics::inline STICKSLIP_KERNELS

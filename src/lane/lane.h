@@ -6,9 +6,15 @@
 // neither on the width nor on its neighbors.
 #pragma once
 
+// Kernels are compiled once per instruction set, each time in an inline namespace of their own: two
+// functions of one name with different instructions must not meet in the linker.
+#ifndef STICKSLIP_KERNELS
+#define STICKSLIP_KERNELS baseline
+#endif
+
 #define STICKSLIP_INLINE inline __attribute__((always_inline))
 
-namespace stickslip {
+namespace stickslip::inline STICKSLIP_KERNELS {
 
 /// What a scalar type is made of: `Value` (one lane), `Mask` (result of a comparison), `kWidth`
 /// (lanes).
@@ -74,4 +80,4 @@ STICKSLIP_INLINE S max(S a, S b) {
   return select(a < b, b, a);
 }
 
-}  // namespace stickslip
+}  // namespace stickslip::inline STICKSLIP_KERNELS

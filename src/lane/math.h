@@ -3,7 +3,7 @@
 #pragma once
 #include "lane/lane.h"
 
-namespace stickslip {
+namespace stickslip::inline STICKSLIP_KERNELS {
 
 /// sin and cos of x [rad], |x| < 1e15: reduction modulo pi/2 in three parts, then minimax
 /// polynomials (fdlibm's for double, Cephes' for float). Error about 1 ulp: 1.1e-16 in double, 9e-8
@@ -110,4 +110,4 @@ STICKSLIP_INLINE double cbrt(double x) {
   return x < 0 ? -r : r;
 }
 
-}  // namespace stickslip
+}  // namespace stickslip::inline STICKSLIP_KERNELS

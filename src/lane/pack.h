@@ -8,7 +8,7 @@
 #include <arm_neon.h>
 #endif
 
-namespace stickslip {
+namespace stickslip::inline STICKSLIP_KERNELS {
 
 // GCC 12 takes a dependent vector_size typedef for its element type in overload resolution, hence
 // one struct per width.
@@ -159,4 +159,4 @@ STICKSLIP_PACK_OPS(float, 4, vfmaq_f32(c.v, a.v, b.v), vsqrtq_f32(a.v))
 #endif
 #undef STICKSLIP_PACK_OPS
 
-}  // namespace stickslip
+}  // namespace stickslip::inline STICKSLIP_KERNELS

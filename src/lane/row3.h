@@ -3,7 +3,7 @@
 #pragma once
 #include "lane/pack.h"
 
-namespace stickslip {
+namespace stickslip::inline STICKSLIP_KERNELS {
 
 template <class S>
 struct Row3 {
@@ -59,4 +59,4 @@ STICKSLIP_INLINE Row3<S> nmadd(const Row3<S>& a, S b, const Row3<S>& c) {  // c 
   return madd(a, -b, c);
 }
 
-}  // namespace stickslip
+}  // namespace stickslip::inline STICKSLIP_KERNELS

@@ -6,7 +6,7 @@
 #pragma once
 #include "spatial/vec3.h"
 
-namespace stickslip {
+namespace stickslip::inline STICKSLIP_KERNELS {
 
 /// A motion (angular velocity; velocity of the point at the reference) or a force (moment about the
 /// reference; force).
@@ -149,4 +149,4 @@ STICKSLIP_INLINE ArticulatedInertia<S> without(const ArticulatedInertia<S>& i, c
   return r;
 }
 
-}  // namespace stickslip
+}  // namespace stickslip::inline STICKSLIP_KERNELS

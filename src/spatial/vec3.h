@@ -2,7 +2,7 @@
 #pragma once
 #include "lane/lane.h"
 
-namespace stickslip {
+namespace stickslip::inline STICKSLIP_KERNELS {
 
 template <class S>
 struct Vec3 {
@@ -145,4 +145,4 @@ STICKSLIP_INLINE Mat3<S> rotation(const S q[4]) {
            nmadd(two, xx + yy, one)}};
 }
 
-}  // namespace stickslip
+}  // namespace stickslip::inline STICKSLIP_KERNELS
