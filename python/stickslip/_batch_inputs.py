@@ -35,7 +35,7 @@ def numbers(name: str, value: Any) -> NDArray[Any]:
     """Real numbers from NumPy, sequences, or anything with `__dlpack__` or `__array__`. May share memory with `value`."""
     result = _taken(name, value)
     if result.dtype.kind not in "fiu":
-        raise TypeError(f"{name} holds {result.dtype.name}; real numbers are wanted")
+        raise TypeError(f"{name} holds {result.dtype.name}; real numbers of a NumPy type are wanted")
     return result
 
 
