@@ -43,6 +43,7 @@ FactoredOptions default_options() {
 template <class S>
 struct FactoredInfo {
   S residual;         // largest of the contacts [m/s]
+  S allowed;          // what it may be [m/s]
   Mask<S> converged;  // residual within tolerance; false where an input is not finite (then the
                       // impulses are zero)
   int sweeps = 0;     // of the slowest lane
@@ -262,6 +263,7 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
   }
   (void)open;
   info.residual = worst;
+  info.allowed = allowed;
   info.converged = finite & (worst <= allowed);
   for (int i = 0; i < p.size(); ++i) {
     FactoredContact<S>& c = p.contact(i);
@@ -270,6 +272,18 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
   }
   if (any(!finite))
     for (int k = 0; k < p.dofs(); ++k) p.w[k] = select(finite, p.w[k], p.w0[k]);
+}
+
+/// Calls f(problem, lane) as above, whatever the number of shared dofs.
+template <class S, class F>
+void solve_lanes(FactoredProblem<S>& p, Mask<S> lanes, F&& f) {
+  p.six() ? solve_lanes<6>(p, lanes, f) : solve_lanes<0>(p, lanes, f);
+}
+
+/// Largest residual of Coulomb's law for the impulses as they are [m/s]; writes the velocities.
+template <class S>
+S certify(FactoredProblem<S>& p) {
+  return p.six() ? certify<6, false>(p) : certify<0, false>(p);
 }
 
 /// Solves the problem in place: impulse(i), velocity(i) and w hold the answer.
