@@ -400,6 +400,26 @@ def test_order_of_environments_changes_no_bit(dtype: str) -> None:
 
 
 @pytest.mark.parametrize("dtype", NUMBERS)
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_instruction_sets_change_no_bit(dtype: str, integrator: str, monkeypatch) -> None:
+    widest = scattered(17, dtype, integrator=integrator)
+    run(widest, 200)
+    tried = []
+    for name in ("avx512", "avx2", "neon"):
+        monkeypatch.setenv("STICKSLIP_ISA", name)
+        try:
+            batch = scattered(17, dtype, integrator=integrator)
+        except ss.ModelError as error:
+            assert name in str(error)
+            continue
+        assert batch.instruction_set == name
+        run(batch, 200)
+        assert_same_bits(batch, widest, ("q", "u", *OUTPUTS), where=name)
+        tried.append(name)
+    assert widest.instruction_set in tried
+
+
+@pytest.mark.parametrize("dtype", NUMBERS)
 def test_several_steps_at_once_are_steps_one_by_one(dtype: str) -> None:
     one, many = scattered(9, dtype), scattered(9, dtype)
     status, residual = np.zeros(9, np.uint32), np.zeros(9, dtype)
