@@ -230,15 +230,11 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
     for (int k = 0; k < p.dofs(); ++k) p.w[k] = select(finite, p.w[k], p.w0[k]);
 }
 
-/// Calls f(problem, lane) as above, whatever the number of shared dofs.
-template <class S, class F>
-void solve_lanes(FactoredProblem<S>& p, Mask<S> lanes, F&& f) {
-  p.six() ? solve_lanes<6>(p, lanes, f) : solve_lanes<0>(p, lanes, f);
-}
-
-/// Largest residual of Coulomb's law for the impulses as they are [m/s]; writes the velocities.
+/// Takes the impulses that each contact holds in place of the solver's, and returns their largest
+/// residual of Coulomb's law [m/s]; writes the velocities. w must be theirs.
 template <class S>
-S certify(FactoredProblem<S>& p) {
+S certify_impulses(FactoredProblem<S>& p) {
+  for (int i = 0; i < p.size(); ++i) set_impulse(p.contact(i), p.impulse(i));
   return p.six() ? certify<6, false>(p) : certify<0, false>(p);
 }
 

@@ -118,6 +118,7 @@ class ContactStage {
   dynamics::LinkIndex* link_of_dof_;
   int num_shared_ = 0;
   int* index_;
+  bool* odd_;  // parity of the depth of each shared dof
   contact::FactoredProblem<S> problem_;
   OverlapCorrection<S> overlap_;
   double* dense_;  // a problem for the host

@@ -16,6 +16,7 @@ void ContactStage<S>::lay_out(contact::Arena& arena, const RobotTables& tables) 
   dof_ = arena.take<int>(links());
   link_of_dof_ = arena.take<dynamics::LinkIndex>(tables.num_joints);
   index_ = arena.take<int>(dofs);
+  odd_ = arena.take<bool>(dofs);
   for (int i = 0; i < points; ++i) {
     auto* path = arena.take<dynamics::LinkIndex>(tables.max_depth);
     auto* joint = arena.take<Row3<S>>(tables.max_depth);
@@ -187,14 +188,19 @@ void ContactStage<S>::number_shared_dofs(const dynamics::Tree<S>& tree) {
     for (int k = 0; k < active_[i].rows.depth; ++k) {
       const dynamics::LinkIndex link = active_[i].rows.path[k];
       if (dof_[flat(link)] >= 0 || !any(shared_[flat(link)])) continue;
-      dof_[flat(link)] = 0;
+      dof_[flat(link)] = active_[i].rows.depth - 1 - k;  // for now, its depth
       int at = num_shared_++;
       for (; at > 0 && joint(link_of_dof_[at - 1]) > joint(link); --at)
         link_of_dof_[at] = link_of_dof_[at - 1];
       link_of_dof_[at] = link;
     }
   const int first = tables_->floating ? 6 : 0;
-  for (int k = 0; k < num_shared_; ++k) dof_[flat(link_of_dof_[k])] = first + k;
+  for (int k = 0; k < first; ++k) odd_[k] = k & 1;
+  for (int k = 0; k < num_shared_; ++k) {
+    int& dof = dof_[flat(link_of_dof_[k])];
+    odd_[first + k] = dof & 1;
+    dof = first + k;
+  }
 }
 
 template <class S>
@@ -202,7 +208,7 @@ void ContactStage<S>::build_problem(dynamics::Tree<S>& tree, const S* friction, 
   compute_rows(tree);
   number_shared_dofs(tree);
   const int base_dofs = tables_->floating ? 6 : 0;
-  problem_.clear(base_dofs + num_shared_);
+  problem_.clear(base_dofs + num_shared_, odd_);
   if (with_x) {
     for (int k = 0; k < base_dofs; ++k) problem_.w0[k] = tree.base.x[k];
     for (int k = 0; k < num_shared_; ++k) {
@@ -386,7 +392,6 @@ HostSolver::Effort ContactStage<S>::ask_host(const HostSolver& host,
   const HostSolver::Effort effort = host.solve(host.self, d, tolerance);
   if (!effort.solved && !host.always) return effort;
   contact::read_back(p, d.impulse, d.velocity);
-  for (int i = 0; i < p.size(); ++i) contact::set_impulse(p.contact(i), p.impulse(i));
   return effort;
 }
 
@@ -415,14 +420,9 @@ void ContactStage<S>::solve_by_chain(const HostSolver& host, Mask<S> lanes, doub
     info.newton_steps += effort.newton_steps;
     if (effort.solved) set_lane(solved, lane, Value<S>(1));
   });
-  const S residual = contact::certify(problem_);
+  const S residual = contact::certify_impulses(problem_);
   info.residual = select(lanes, residual, info.residual);
   info.unconverged = info.unconverged & !(lanes & (solved > zero) & (residual <= allowed));
-  for (int i = 0; i < count_; ++i) {
-    S l[3], *impulse = problem_.impulse(i);
-    store(problem_.contact(i).lambda, l);
-    for (int r = 0; r < 3; ++r) impulse[r] = select(lanes, l[r], impulse[r]);
-  }
 }
 
 template <class S>
