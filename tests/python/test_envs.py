@@ -60,6 +60,12 @@ def test_importing_stickslip_does_not_import_gymnasium() -> None:
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
 
 
+def test_missing_gymnasium_is_named_with_its_remedy() -> None:
+    code = "import sys; sys.modules['gymnasium'] = None; import stickslip.envs"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert result.returncode == 1 and "pip install 'stickslip[gym]'" in result.stderr
+
+
 def test_specification_survives_json() -> None:
     spec = gymnasium.spec(ID)
     assert gymnasium.envs.registration.EnvSpec.from_json(spec.to_json()) == spec
@@ -194,6 +200,25 @@ def test_steps_before_reset_and_after_close_are_refused() -> None:
     envs.close()
     with pytest.raises(ClosedEnvironmentError, match="closed"):
         envs.reset()
+
+
+def test_gymnasiums_processes_take_it() -> None:
+    vector = gymnasium.make_vec(ID, num_envs=2, vectorization_mode="async", config=lively())
+    native = make(2)
+    assert np.array_equal(native.reset(seed=[4, 5])[0], vector.reset(seed=4)[0])
+    assert_same_steps(run(native, 5), run(vector, 5))
+    vector.close()
+
+
+def test_batch_in_double_precision_takes_and_gives_float32() -> None:
+    envs, double = make(3), make(3, dtype="float64", num_threads=2)
+    assert double.batch.dtype == np.float64 and double.single_observation_space == envs.single_observation_space
+    envs.reset(seed=2)
+    double.reset(seed=2)
+    for step in range(3):
+        result, wanted = double.step(actions_of(step, 3)), envs.step(actions_of(step, 3))
+        assert result[0].dtype == result[1].dtype == np.float32
+        assert np.allclose(result[0], wanted[0], atol=1e-2) and np.allclose(result[1], wanted[1], atol=1e-2)
 
 
 @pytest.mark.parametrize("mode", MODES)
