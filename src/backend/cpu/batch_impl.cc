@@ -166,7 +166,7 @@ void Batch::Impl::reset(long env, const double* q, const double* u) {
   if (t.floating) norm = std::sqrt(q[3] * q[3] + q[4] * q[4] + q[5] * q[5] + q[6] * q[6]);
   for (int k = 0; k < history_rows.numbers; ++k) set_history(env, k, 0);
   for (int k = 0; k < t.nq; ++k) {
-    const double x = (t.floating && k >= 3 && k < 7 ? q[k] / norm : q[k]) + 0.0;
+    const double x = t.floating && k >= 3 && k < 7 ? q[k] / norm : q[k];
     memory.set(kQ, env, k, x);
     set_history(env, history_rows.q + k, x);
   }
