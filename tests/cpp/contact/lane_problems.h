@@ -183,6 +183,12 @@ inline Places places_of(int family, bool any_chain, Random& rng) {
       p.paths.push_back(path), p.paths.push_back(prefix(path, 4));
     }
     p.paths.push_back({}), p.paths.push_back({});
+    // A hand on a thigh: what is shared of two paths is no prefix of one.
+    for (int arm = 0; arm < 2; ++arm) {
+      std::vector<int> both = prefix(p.paths[5 * arm], 3);
+      for (int j : p.paths[12 + 2 * arm]) both.push_back(j);
+      p.paths.push_back(both);
+    }
   } else {
     p.base_dofs = 0;
     for (int arm = 0; arm < 2; ++arm) {
