@@ -44,6 +44,7 @@ FactoredOptions default_options() {
 template <class S>
 struct FactoredInfo {
   S residual;         // largest of the contacts [m/s]
+  S allowed;          // what it may be [m/s]
   Mask<S> converged;  // residual within tolerance; false where an input is not finite (then the
                       // impulses are zero)
   int sweeps = 0;     // of the slowest lane
@@ -219,6 +220,7 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
   }
   (void)open;
   info.residual = worst;
+  info.allowed = allowed;
   info.converged = finite & (worst <= allowed);
   for (int i = 0; i < p.size(); ++i) {
     FactoredContact<S>& c = p.contact(i);
@@ -227,6 +229,14 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
   }
   if (any(!finite))
     for (int k = 0; k < p.dofs(); ++k) p.w[k] = select(finite, p.w[k], p.w0[k]);
+}
+
+/// Takes the impulses that each contact holds in place of the solver's, and returns their largest
+/// residual of Coulomb's law [m/s]; writes the velocities. w must be theirs.
+template <class S>
+S certify_impulses(FactoredProblem<S>& p) {
+  for (int i = 0; i < p.size(); ++i) set_impulse(p.contact(i), p.impulse(i));
+  return p.six() ? certify<6, false>(p) : certify<0, false>(p);
 }
 
 /// Solves the problem in place: impulse(i), velocity(i) and w hold the answer.

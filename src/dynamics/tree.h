@@ -87,6 +87,14 @@ STICKSLIP_INLINE S lane_of(const Wide<S>& w, int lane) {
     return get_lane(w, lane);
 }
 
+template <class S>
+STICKSLIP_INLINE void put_lane(Wide<S>& w, int lane, S value) {
+  if constexpr (BundleScalar<S>::kLanes == 1)
+    w = value;
+  else
+    set_lane(w, lane, value);
+}
+
 template <class S, template <class> class X>
 inline constexpr int kNumbersIn = sizeof(X<S>) / sizeof(S);
 
