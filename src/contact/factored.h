@@ -192,7 +192,8 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
     store(add_rows<M>(c, p.w0, make_row3(c.offset[0], c.offset[1], c.offset[2])), v);
     const S square = madd(v[0], v[0], madd(v[1], v[1], v[2] * v[2]));
     fastest = max(fastest, select(c.active, square, zero));
-    sum = sum + (square + c.local.scale + abs(c.impulse[0]) + abs(c.impulse[1]) + c.impulse[2]);
+    sum = sum + (square + c.local.scale + abs(c.impulse[0]) + abs(c.impulse[1]) + c.impulse[2] +
+                 abs(c.local.mu));
   }
   accumulate<M>(p);
   const S relative = constant<S>(o.tolerance_relative),
