@@ -12,16 +12,23 @@ import re
 import sys
 from pathlib import Path
 
-KERNEL_FOLDERS = ("lane", "spatial", "dynamics", "contact")
-# The host side of a step (memory, shapes, the order of stages): held to the rules that keep bits equal, free to use the
+KERNEL_FOLDERS = ("lane", "spatial", "dynamics", "collide", "contact", "step")
+# The host side (worlds, batches, solvers of the public API): held to the rules that keep bits equal, free to use the
 # standard library.
-HOST_FOLDERS = ("collide", "solvers", "step", "backend")
+HOST_FOLDERS = ("solvers", "backend")
 
 # Headers of kernel folders for the host side: they size memory and read models.
 HOST_HEADERS = {
+    "collide/ground_shapes.h",
     "contact/method_of.h",
     "dynamics/tree_layout.h",
     "dynamics/tree_memory.h",
+    "step/host_solver.h",
+    "step/robot_data.h",
+    "step/robot_impl.h",
+    "step/robot_scene.h",
+    "step/snapshot.h",
+    "step/world_impl.h",
 }
 # Where a library's linear algebra serves: systems beyond robot size, which no step solves.
 LIBRARY_FILES = {"solvers/large_system.cc", "solvers/minimum_norm.cc"}

@@ -106,6 +106,7 @@ struct StageTimes {
 };
 
 class World;
+class Batch;
 
 /// A robot in a world, made by `World::add_robot`. References stay valid as long as the world.
 /// Functions with an `out` throw ModelError where it has the wrong length; those that take a frame
@@ -219,6 +220,7 @@ class World {
   void reset_stage_times();
 
  private:
+  friend class Batch;
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

@@ -6,6 +6,9 @@
 #include <stickslip/world.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <string>
+#include <vector>
 
 #include "bindings.h"
 #include "scenes/experiments.h"
@@ -33,6 +36,36 @@ nb::tuple initial_state(const std::string& task, int episode) {
   scenes::initial_state(scenes::task_spec(task).kind, episode, {q.data(), q.size()},
                         {u.data(), u.size()});
   return nb::make_tuple(q, u);
+}
+
+/// Integers that come in: episodes, numbers of targets.
+using IndicesIn = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+
+/// q (n, 19), u (n, 18) at the start of episodes.
+nb::tuple initial_states(const std::string& task, const IndicesIn& episodes) {
+  constexpr std::size_t nq = 7 + scenes::kNumJoints, nu = 6 + scenes::kNumJoints;
+  const scenes::TaskKind kind = scenes::task_spec(task).kind;
+  const std::size_t n = episodes.size();
+  ArrayOut q = make_array({n, nq}, [](std::span<double>) {});
+  ArrayOut u = make_array({n, nu}, [](std::span<double>) {});
+  for (std::size_t k = 0; k < n; ++k)
+    scenes::initial_state(kind, static_cast<int>(episodes.data()[k]), {q.data() + k * nq, nq},
+                          {u.data() + k * nu, nu});
+  return nb::make_tuple(q, u);
+}
+
+/// (n, 12) PD targets [rad]: of each of the episodes the one with this number.
+ArrayOut pd_targets(const std::string& task, const IndicesIn& episodes, const IndicesIn& numbers) {
+  if (episodes.size() != numbers.size())
+    throw ModelError("numbers has " + std::to_string(numbers.size()) + " entries; there are " +
+                     std::to_string(episodes.size()) + " episodes");
+  const scenes::TaskKind kind = scenes::task_spec(task).kind;
+  return make_array({episodes.size(), scenes::kNumJoints}, [&](std::span<double> to) {
+    for (std::size_t k = 0; k < episodes.size(); ++k)
+      scenes::pd_target(kind, static_cast<int>(episodes.data()[k]),
+                        static_cast<int>(numbers.data()[k]),
+                        to.subspan(k * scenes::kNumJoints, scenes::kNumJoints));
+  });
 }
 
 /// Runs `steps` steps, the next episode where one is over, and lets Ctrl-C through. Returns how
@@ -164,6 +197,15 @@ void bind_scenes(nb::module_& parent) {
       },
       "task"_a, "anymal"_a);
   m.def("initial_state", &initial_state, "task"_a, "episode"_a);
+  m.def("initial_states", &initial_states, "task"_a, "episodes"_a);
+  m.def("pd_targets", &pd_targets, "task"_a, "episodes"_a, "numbers"_a);
+  nb::class_<scenes::TaskSpec>(m, "TaskSpec")
+      .def_ro("kp", &scenes::TaskSpec::kp)
+      .def_ro("kd", &scenes::TaskSpec::kd)
+      .def_ro("episode", &scenes::TaskSpec::episode)
+      .def_ro("moving_targets", &scenes::TaskSpec::moving_targets)
+      .def_ro("ends_when_still", &scenes::TaskSpec::ends_when_still);
+  m.def("task_spec", [](const std::string& task) { return scenes::task_spec(task); }, "task"_a);
   nb::class_<Task>(m, "Task")
       .def(
           "__init__",

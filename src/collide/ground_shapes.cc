@@ -1,13 +1,12 @@
 #include "collide/ground_shapes.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "model/pose.h"
 
 namespace stickslip::collide {
 namespace {
-
-Vec3<double> column(const Mat3<double>& m, int k) { return {m.m[k], m.m[3 + k], m.m[6 + k]}; }
 
 int points_of(ShapeType type) {
   switch (type) {
@@ -22,20 +21,6 @@ int points_of(ShapeType type) {
       return 0;
   }
   return 0;
-}
-
-/// Center of support point `point` of a cylinder: cap = point / 4, rim direction = point % 4.
-Vec3<double> rim_point(const GroundShape& shape, const PlacedShape& placed, int point) {
-  const Vec3<double> axis = column(placed.axes, 2);
-  // Direction in the cap that goes down fastest; any direction when the cap is level.
-  Vec3<double> down{axis.z * axis.x, axis.z * axis.y, axis.z * axis.z - 1};
-  const double n = std::sqrt(dot(down, down));
-  down = n > 1e-9 ? down * (1 / n) : column(placed.axes, 0);
-  const Vec3<double> side = cross(axis, down);
-  const double along = point < 4 ? -shape.half.z : shape.half.z;
-  const int k = point % 4;
-  const Vec3<double> rim = k < 2 ? down : side;
-  return madd(rim, k % 2 ? -shape.half.x : shape.half.x, madd(axis, along, placed.center));
 }
 
 }  // namespace
@@ -53,25 +38,29 @@ std::vector<GroundShape> ground_shapes(const Model& model, const dynamics::TreeL
     g.shape = static_cast<int>(i);
     g.type = s.type;
     const Vector3 c = layout.turned(s.body, s.pose.position);
-    g.center = {c[0], c[1], c[2]};
+    std::copy(c.begin(), c.end(), g.center);
     const Matrix3 axes = multiply(transpose(layout.turn[s.body]), s.pose.rotation);
-    for (int k = 0; k < 9; ++k) g.axes.m[k] = axes[k];
+    std::copy(axes.begin(), axes.end(), g.axes);
+    const auto set_half = [&g](double x, double y, double z) {
+      g.half[0] = x, g.half[1] = y, g.half[2] = z;
+    };
     switch (s.type) {
       case ShapeType::kSphere:
         g.radius = g.bounding_radius = s.size[0];
         break;
       case ShapeType::kBox:
-        g.half = {s.size[0] / 2, s.size[1] / 2, s.size[2] / 2};
-        g.bounding_radius = std::sqrt(dot(g.half, g.half));
+        set_half(s.size[0] / 2, s.size[1] / 2, s.size[2] / 2);
+        g.bounding_radius =
+            std::sqrt(g.half[0] * g.half[0] + g.half[1] * g.half[1] + g.half[2] * g.half[2]);
         break;
       case ShapeType::kCapsule:
         g.radius = s.size[0];
-        g.half = {s.size[0], s.size[0], s.size[1] / 2};
+        set_half(s.size[0], s.size[0], s.size[1] / 2);
         g.bounding_radius = s.size[0] + s.size[1] / 2;
         break;
       default:
-        g.half = {s.size[0], s.size[0], s.size[1] / 2};
-        g.bounding_radius = std::sqrt(g.half.x * g.half.x + g.half.z * g.half.z);
+        set_half(s.size[0], s.size[0], s.size[1] / 2);
+        g.bounding_radius = std::sqrt(g.half[0] * g.half[0] + g.half[2] * g.half[2]);
     }
     g.first_point = points;
     g.num_points = points_of(s.type);
@@ -90,50 +79,6 @@ std::vector<int> unsupported_shapes(const Model& model) {
 
 int total_points(const std::vector<GroundShape>& shapes) {
   return shapes.empty() ? 0 : shapes.back().first_point + shapes.back().num_points;
-}
-
-PlacedShape place(const dynamics::Tree<double>& tree, const GroundShape& shape) {
-  PlacedShape p;
-  p.center = dynamics::point_position(tree, shape.link, shape.center);
-  if (shape.type == ShapeType::kSphere) {
-    p.lowest = p.center.z - shape.radius;
-    return p;
-  }
-  const Mat3<double> r =
-      shape.link.slot == dynamics::kBaseSlot
-          ? tree.base.rotation
-          : dynamics::field_of<double, Mat3>(
-                tree, shape.link, &dynamics::LinkState<dynamics::Wide<double>>::rotation);
-  p.axes = r * shape.axes;
-  const Vec3<double> z{p.axes.m[6], p.axes.m[7], p.axes.m[8]};
-  if (shape.type == ShapeType::kBox)
-    p.lowest = p.center.z - (std::fabs(z.x) * shape.half.x + std::fabs(z.y) * shape.half.y +
-                             std::fabs(z.z) * shape.half.z);
-  else  // capsule; a cylinder lies inside the capsule-like bound radius + half length * |axis|
-    p.lowest = p.center.z - (shape.half.x + std::fabs(z.z) * shape.half.z);
-  return p;
-}
-
-Vec3<double> support_point(const GroundShape& shape, const PlacedShape& placed, int point) {
-  Vec3<double> c = placed.center;
-  const auto sign = [&](int bit) { return point & bit ? 1.0 : -1.0; };
-  switch (shape.type) {
-    case ShapeType::kBox:
-      c = madd(column(placed.axes, 0), sign(1) * shape.half.x, c);
-      c = madd(column(placed.axes, 1), sign(2) * shape.half.y, c);
-      c = madd(column(placed.axes, 2), sign(4) * shape.half.z, c);
-      break;
-    case ShapeType::kCapsule:
-      c = madd(column(placed.axes, 2), sign(1) * shape.half.z, c);
-      break;
-    case ShapeType::kCylinder:
-      c = rim_point(shape, placed, point);
-      break;
-    default:
-      break;
-  }
-  c.z -= shape.radius;
-  return c;
 }
 
 }  // namespace stickslip::collide

@@ -9,6 +9,7 @@
 // end, and its residual is |G_ii (lambda_i - local_i)|.
 #pragma once
 #include "contact/jam.h"
+#include "contact/one_lane.h"
 
 namespace stickslip::contact::inline STICKSLIP_KERNELS {
 
@@ -43,6 +44,7 @@ FactoredOptions default_options() {
 template <class S>
 struct FactoredInfo {
   S residual;         // largest of the contacts [m/s]
+  S allowed;          // what it may be [m/s]
   Mask<S> converged;  // residual within tolerance; false where an input is not finite (then the
                       // impulses are zero)
   int sweeps = 0;     // of the slowest lane
@@ -71,7 +73,7 @@ STICKSLIP_STAGE S certify(FactoredProblem<S>& p) {
   constexpr int kLanes = kMaxDissipation ? 1 : kChunk<S>;
   using T = typename ChunkOf<S, kLanes != 1>::Type;
   const int n = p.size();
-  T worst = constant<T>(0), sum = constant<T>(0);
+  T worst = constant<T>(0), spoiled = constant<T>(0);  // NaN once a residual is not finite
   for (int first = 0; first < n; first += kLanes) {
     LocalContact<T> k;
     T v[3], l[3];
@@ -96,18 +98,17 @@ STICKSLIP_STAGE S certify(FactoredProblem<S>& p) {
       e = natural_map_residual(k, v, l);
     e = e + impulse_rounding(k, l);
     worst = max(worst, e);
-    sum = sum + e;
+    spoiled = madd(constant<T>(0), e, spoiled);
   }
-  worst = madd(constant<T>(0), sum, worst);  // NaN if any is
   if constexpr (kLanes == 1) {
-    return worst;
+    return worst + spoiled;
   } else {
-    S most = get_lane(worst, 0), total = most;
+    S most = get_lane(worst, 0), all = get_lane(spoiled, 0);
     for (int j = 1; j < kLanes; ++j) {
       most = max(most, get_lane(worst, j));
-      total = total + get_lane(worst, j);
+      all = all + get_lane(spoiled, j);
     }
-    return madd(constant<S>(0), total, most);
+    return most + all;
   }
 }
 
@@ -136,71 +137,27 @@ STICKSLIP_INLINE Mask<S> iterate(FactoredProblem<S>& p, Mask<S> live, S toleranc
   }
 }
 
-/// One lane of a pack (or a float problem) as a double problem.
-template <class S>
-void extract_lane(const FactoredProblem<S>& p, int lane, FactoredProblem<double>& q) {
-  q.clear(p.dofs());
-  for (int k = 0; k < p.dofs(); ++k) q.w0[k] = get_lane(p.w0[k], lane);
-  for (int i = 0; i < p.size(); ++i) {
-    const FactoredContact<S>& c = p.contact(i);
-    const int j = q.add();
-    if (!p.six()) q.set_index(j, c.index, c.count);
-    for (int k = 0; k < (p.six() ? 6 : c.count); ++k) {
-      S y[3];
-      store(c.y[k], y);
-      q.y(j)[k] = make_row3(double(get_lane(y[0], lane)), double(get_lane(y[1], lane)),
-                            double(get_lane(y[2], lane)));
-    }
-    S l[3];
-    store(c.lambda, l);
-    for (int r = 0; r < 3; ++r) {
-      q.offset(j)[r] = get_lane(c.offset[r], lane);
-      q.impulse(j)[r] = get_lane(l[r], lane);
-    }
-    for (int r = 0; r < 6; ++r) q.private_block(j)[r] = get_lane(c.private_block[r], lane);
-    q.friction(j) = get_lane(c.friction, lane);
-  }
-}
-
 /// Calls f(problem, lane) with each of the lanes as a prepared problem in double, and takes the
-/// impulses that it leaves.
+/// impulses and w that it leaves (`lambda` and w are those of p).
 template <int M, class S, class F>
-void solve_lanes(FactoredProblem<S>& p, Mask<S> lanes, F&& f) {
-  for (int l = 0; l < ScalarTraits<S>::kWidth; ++l) {
-    if (!get_lane(lanes, l)) continue;
-    if constexpr (ScalarTraits<S>::kWidth == 1 && sizeof(S) == 8) {
-      // Prepared afresh, as a lane of a pack is below: the same bits either way.
-      for (int i = 0; i < p.size(); ++i) {
-        store(p.contact(i).lambda, p.contact(i).impulse);
-        prepare_contact<M>(p.contact(i));
-      }
-      f(p, l);
-    } else {
-      FactoredProblem<double>& q = *p.lane;
-      extract_lane(p, l, q);
-      for (int i = 0; i < q.size(); ++i) {
-        q.complete(i);
-        prepare_contact<M>(q.contact(i));
-      }
-      f(q, l);
-      for (int i = 0; i < q.size(); ++i) {
-        double from[3];
-        S to[3];
-        store(q.contact(i).lambda, from);
-        store(p.contact(i).lambda, to);
-        for (int r = 0; r < 3; ++r) set_lane(to[r], l, Value<S>(from[r]));
-        set_impulse(p.contact(i), to);
-      }
-      // Only this lane's w is rebuilt.
-      for (int k = 0; k < p.dofs(); ++k) set_lane(p.w[k], l, Value<S>(q.w[k]));
+void improve_lanes(FactoredProblem<S>& p, Mask<S> lanes, F&& f) {
+  for (int i = 0; i < p.size(); ++i) store(p.contact(i).lambda, p.contact(i).impulse);
+  solve_lanes(p, lanes, [&](FactoredProblem<double>& q, int lane) {
+    // Prepared afresh also where it is p itself: the same bits either way.
+    for (int i = 0; i < q.size(); ++i) {
+      q.complete(i);
+      prepare_contact<M>(q.contact(i));
     }
-  }
+    f(q, lane);
+    for (int i = 0; i < q.size(); ++i) store(q.contact(i).lambda, q.contact(i).impulse);
+  });
+  for (int i = 0; i < p.size(); ++i) set_impulse(p.contact(i), p.contact(i).impulse);
 }
 
 template <int M, class S>
 __attribute__((noinline)) void run_fallback(FactoredProblem<S>& p, Mask<S> lanes, S tolerance,
                                             FactoredInfo<S>& info) {
-  solve_lanes<M>(p, lanes, [&](FactoredProblem<double>& q, int lane) {
+  improve_lanes<M>(p, lanes, [&](FactoredProblem<double>& q, int lane) {
     ++info.fallbacks;
     Fallback<M> fallback(q, double(get_lane(tolerance, lane)));
     fallback.run();
@@ -216,7 +173,7 @@ __attribute__((noinline)) void release_jams(FactoredProblem<S>& p, Mask<S> bad, 
   const JamLimits<S> limits = jam_limits(fastest, allowed);
   const auto jammed = bad & jammed_lanes(p, limits);
   if (!any(jammed)) return;
-  solve_lanes<M>(p, jammed, [&](FactoredProblem<double>& q, int lane) {
+  improve_lanes<M>(p, jammed, [&](FactoredProblem<double>& q, int lane) {
     const JamLimits<double> one = {double(get_lane(limits.impulse, lane)),
                                    double(get_lane(limits.sinking, lane))};
     JamRelease<M, kMaxDissipation>(q, one, double(get_lane(allowed, lane))).run();
@@ -234,7 +191,7 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
     S v[3];
     store(add_rows<M>(c, p.w0, make_row3(c.offset[0], c.offset[1], c.offset[2])), v);
     const S square = madd(v[0], v[0], madd(v[1], v[1], v[2] * v[2]));
-    fastest = max(fastest, square);
+    fastest = max(fastest, select(c.active, square, zero));
     sum = sum + (square + c.local.scale + abs(c.impulse[0]) + abs(c.impulse[1]) + c.impulse[2]);
   }
   accumulate<M>(p);
@@ -262,6 +219,7 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
   }
   (void)open;
   info.residual = worst;
+  info.allowed = allowed;
   info.converged = finite & (worst <= allowed);
   for (int i = 0; i < p.size(); ++i) {
     FactoredContact<S>& c = p.contact(i);
@@ -270,6 +228,14 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
   }
   if (any(!finite))
     for (int k = 0; k < p.dofs(); ++k) p.w[k] = select(finite, p.w[k], p.w0[k]);
+}
+
+/// Takes the impulses that each contact holds in place of the solver's, and returns their largest
+/// residual of Coulomb's law [m/s]; writes the velocities. w must be theirs.
+template <class S>
+S certify_impulses(FactoredProblem<S>& p) {
+  for (int i = 0; i < p.size(); ++i) set_impulse(p.contact(i), p.impulse(i));
+  return p.six() ? certify<6, false>(p) : certify<0, false>(p);
 }
 
 /// Solves the problem in place: impulse(i), velocity(i) and w hold the answer.

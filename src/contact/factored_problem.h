@@ -10,6 +10,11 @@
 // chunks (update of w: a chunk of dofs at once). For a plain scalar a chunk is a 4-lane pack, for a
 // pack it is one dof: either way each number goes through the same operations in the same order, so
 // a lane of a pack has the bits of the plain scalar.
+//
+// In a pack the problem is the union of what its lanes need. A lane has `active` false for a
+// contact that is not its own, and columns of zeros for dofs that only other lanes share. Neither
+// changes a bit of it (but the sign of a zero) against the problem of that lane alone, as long as
+// its own contacts and dofs come in the same order and its dofs lie in the same chains (`clear`).
 #pragma once
 #include "contact/residual.h"
 #include "lane/row3.h"
@@ -66,6 +71,8 @@ struct FactoredContact {
   Mask<S> active;      // false in lanes that do not have this contact
   int count;           // shared dofs it touches
   int* index;          // which ones, ascending
+  const bool* odd;     // of the problem's dofs: which of two chains sums it (add_rows)
+  bool alternates;     // index[k] is in chain k & 1
   Row3<S>* y;          // column k: the three rows at dof index[k] [1/sqrt(kg)]
   // Output.
   S velocity[3];  // v_i [m/s]
@@ -122,12 +129,19 @@ class FactoredProblem {
   }
   void attach(void* memory, FactoredCapacity capacity) { lay_out(memory, capacity); }
 
-  /// Starts a new problem with m shared dofs and w0 = 0.
-  void clear(int m) {
+  /// Starts a new problem with m shared dofs and w0 = 0. `odd[k]`: in which of two chains the
+  /// products of dof k are added (default: k & 1). Where lanes share different dofs it must be a
+  /// property of the dof, not of its number here. Fast is what alternates along the dofs of a
+  /// contact: k & 1 for those of a base, then the parity of the depth of a joint.
+  void clear(int m, const bool* odd = nullptr) {
     n_ = 0;
     m_ = m;
     identity_ = true;
     for (int k = 0; k < padded(m); ++k) w0[k] = constant<S>(0);
+    for (int k = 0; k < m; ++k) {
+      odd_[k] = odd ? odd[k] : k & 1;
+      identity_ = identity_ && odd_[k] == (k & 1);
+    }
   }
   /// Adds a contact that touches all shared dofs, without private part, offset, or warm start;
   /// returns its number.
@@ -149,13 +163,17 @@ class FactoredProblem {
     identity_ = false;
   }
 
-  /// Fills in the index list of a contact that touches all shared dofs.
+  /// Fills in the index list of a contact that touches all shared dofs, and its chains.
   void complete(int i) {
+    if (six()) return;
     FactoredContact<S>& c = contacts_[i];
-    if (c.count >= 0) return;
-    c.count = m_;
-    if (!six())
+    if (c.count < 0) {
+      c.count = m_;
       for (int k = 0; k < m_; ++k) c.index[k] = k;
+    }
+    c.odd = odd_;
+    c.alternates = true;
+    for (int k = 0; k < c.count; ++k) c.alternates = c.alternates && odd_[c.index[k]] == (k & 1);
   }
 
   Row3<S>* y(int i) { return contacts_[i].y; }
@@ -170,6 +188,7 @@ class FactoredProblem {
 
   int size() const { return n_; }
   int dofs() const { return m_; }
+  const bool* odd() const { return odd_; }
   /// Every contact touches all of exactly six dofs (one floating base): the unrolled case.
   bool six() const { return identity_ && m_ == 6; }
   FactoredCapacity capacity() const { return capacity_; }
@@ -195,6 +214,7 @@ class FactoredProblem {
     matrix = arena.take<S>(long(m) * wide + 8);
     scratch = arena.take<S>(3 * wide);
     saved = arena.take<S>(15 * n);
+    odd_ = arena.take<bool>(m);
     for (int i = 0; i < n; ++i) {
       int* index = arena.take<int>(m);
       int* start = arena.take<int>(m);
@@ -222,6 +242,7 @@ class FactoredProblem {
   FactoredContact<S>* contacts_ = nullptr;
   FactoredCapacity capacity_;
   int n_ = 0, m_ = 0;
+  bool* odd_ = nullptr;
   bool identity_ = true;
 };
 
@@ -229,21 +250,27 @@ class FactoredProblem {
 /// = 6: all six dofs, unrolled; M = 0: by index.
 template <int M, class S>
 STICKSLIP_INLINE Row3<S> add_rows(const FactoredContact<S>& c, const S* w, const Row3<S>& start) {
+  const S zero = constant<S>(0);
+  Row3<S> a = start, b = make_row3(zero, zero, zero);
   if constexpr (M == 6) {
-    Row3<S> a = madd(c.y[0], w[0], start), b = c.y[1] * w[1];
+    a = madd(c.y[0], w[0], a), b = madd(c.y[1], w[1], b);
     a = madd(c.y[2], w[2], a), b = madd(c.y[3], w[3], b);
     a = madd(c.y[4], w[4], a), b = madd(c.y[5], w[5], b);
-    return a + b;
-  } else {
-    const S zero = constant<S>(0);
-    Row3<S> a = start, b = make_row3(zero, zero, zero);
+  } else if (c.alternates) {
     for (int k = 0; k + 1 < c.count; k += 2) {
       a = madd(c.y[k], w[c.index[k]], a);
       b = madd(c.y[k + 1], w[c.index[k + 1]], b);
     }
     if (c.count & 1) a = madd(c.y[c.count - 1], w[c.index[c.count - 1]], a);
-    return a + b;
+  } else {
+    for (int k = 0; k < c.count; ++k) {
+      if (c.odd[c.index[k]])
+        b = madd(c.y[k], w[c.index[k]], b);
+      else
+        a = madd(c.y[k], w[c.index[k]], a);
+    }
   }
+  return a + b;
 }
 
 /// target += Y^T d.

@@ -61,32 +61,32 @@ STICKSLIP_INLINE void transpose_rows(FactoredContact<S>& c) {
 
 /// In lanes that do not have the contact it is replaced by one that is always open and moves
 /// nothing.
-template <class S>
+template <int M, class S>
 STICKSLIP_INLINE void clear_inactive(FactoredContact<S>& c) {
-  if constexpr (ScalarTraits<S>::kWidth > 1) {
-    // Not zero, so that it counts as opening; too small to show in a tolerance.
-    const S zero = constant<S>(0), one = constant<S>(1), tiny = constant<S>(1e-30);
-    for (int k = 0; k < c.count; ++k) {
-      c.y[k].x = select(c.active, c.y[k].x, zero);
-      c.y[k].y = select(c.active, c.y[k].y, zero);
-      c.y[k].z = select(c.active, c.y[k].z, zero);
-    }
-    for (int i = 0; i < 6; ++i)
-      c.private_block[i] =
-          select(c.active, c.private_block[i], i == 0 || i == 3 || i == 5 ? one : zero);
-    for (int r = 0; r < 3; ++r) {
-      c.offset[r] = select(c.active, c.offset[r], r == 2 ? tiny : zero);
-      c.impulse[r] = select(c.active, c.impulse[r], zero);
-    }
-    c.friction = select(c.active, c.friction, zero);
+  if (all(c.active)) return;
+  // Not zero, so that it counts as opening; too small to show in a tolerance.
+  const S zero = constant<S>(0), one = constant<S>(1), tiny = constant<S>(1e-30);
+  for (int k = 0; k < (M == 6 ? 6 : c.count); ++k) {
+    S y[3];
+    store(c.y[k], y);
+    for (S& x : y) x = select(c.active, x, zero);
+    c.y[k] = make_row3(y[0], y[1], y[2]);
   }
+  for (int i = 0; i < 6; ++i)
+    c.private_block[i] =
+        select(c.active, c.private_block[i], i == 0 || i == 3 || i == 5 ? one : zero);
+  for (int r = 0; r < 3; ++r) {
+    c.offset[r] = select(c.active, c.offset[r], r == 2 ? tiny : zero);
+    c.impulse[r] = select(c.active, c.impulse[r], zero);
+  }
+  c.friction = select(c.active, c.friction, zero);
 }
 
 /// Blocks of one contact from its rows, and its warm start (brought back into the cone).
 template <int M, class S>
 STICKSLIP_STAGE void prepare_contact(FactoredContact<S>& c) {
   const S zero = constant<S>(0), one = constant<S>(1);
-  clear_inactive(c);
+  clear_inactive<M>(c);
   transpose_rows<M>(c);
   const int n = M == 6 ? 6 : c.count;
   Row3<S> d[3];

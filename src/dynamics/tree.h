@@ -89,6 +89,14 @@ STICKSLIP_INLINE S lane_of(const Wide<S>& w, int lane) {
     return get_lane(w, lane);
 }
 
+template <class S>
+STICKSLIP_INLINE void put_lane(Wide<S>& w, int lane, S value) {
+  if constexpr (BundleScalar<S>::kLanes == 1)
+    w = value;
+  else
+    set_lane(w, lane, value);
+}
+
 /// A field of one link.
 template <class S, template <class> class X>
 STICKSLIP_INLINE X<S> field_of(const Tree<S>& t, LinkIndex link,

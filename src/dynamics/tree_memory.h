@@ -34,15 +34,6 @@ class TreeMemory {
 
   Tree<S>& tree() { return tree_; }
   const TreeLayout& layout() const { return layout_; }
-  int max_depth() const {
-    int deepest = 0;
-    for (int j = 0; j < layout_.num_joints; ++j) {
-      int depth = 0;
-      for (int k = j; k >= 0; k = layout_.parent_joint[k]) ++depth;
-      deepest = depth > deepest ? depth : deepest;
-    }
-    return deepest;
-  }
 
  private:
   TreeLayout layout_;

@@ -1,126 +1,129 @@
 // From shapes to impulses: which support points take part, their rows, the factored problem, its
-// solve.
+// solve. A contact is in the list when any lane needs it; `active` says which lanes do.
 #pragma once
-#include <stickslip/world.h>
-
-#include <memory>
-#include <vector>
-
-#include "collide/ground_shapes.h"
-#include "contact/explicit_problem.h"
+#include "collide/support_points.h"
 #include "contact/factored.h"
+#include "contact/write_out.h"
 #include "dynamics/contact_rows.h"
-#include "dynamics/tree_memory.h"
 #include "step/overlap_correction.h"
+#include "step/step_tables.h"
 
-namespace stickslip::step {
+namespace stickslip::step::inline STICKSLIP_KERNELS {
 
 /// A support point that takes part in the solve.
+template <class S>
 struct ActiveContact {
-  int shape;              // index in ContactStage::shapes()
-  int point;              // of the shape
-  int id;                 // among all support points of the robot
-  Vec3<double> position;  // relative to the base origin, world axes
-  double gap;             // [m]
-  Vec3<double> velocity;  // of the point before the impulse [m/s]
-  Vec3<double> gravity;   // acceleration of the point by gravity alone [m/s^2]
-  double shift;  // added to the normal velocity: allowed approach gap / h, less restitution [m/s]
-  dynamics::ContactRows<double> rows;
+  int shape;         // index in RobotTables::shapes
+  int point;         // of the shape
+  int id;            // among all support points of the robot
+  Mask<S> active;    // lanes that have it
+  Vec3<S> position;  // relative to the base origin, world axes
+  S gap;             // [m]
+  Vec3<S> velocity;  // of the point before the impulse [m/s]
+  Vec3<S> gravity;   // acceleration of the point by gravity alone [m/s^2]
+  S shift;  // added to the normal velocity: allowed approach gap / h, less restitution [m/s]
+  dynamics::ContactRows<S> rows;
 };
 
+template <class S>
+struct LaneInfo;
+
+template <class S>
 class ContactStage {
  public:
-  ContactStage(const Model& model, const dynamics::TreeLayout& layout, int max_depth);
+  void lay_out(contact::Arena& arena, const RobotTables& tables);
 
-  const std::vector<collide::GroundShape>& shapes() const { return shapes_; }
-  int num_points() const { return num_points_; }
-  /// Contact law per shape of `shapes()`.
-  std::vector<MaterialPair>& laws() { return laws_; }
-  const MaterialPair& law(int shape) const { return laws_[shape]; }
+  int count() const { return count_; }
+  const ActiveContact<S>& active(int i) const { return active_[i]; }
+  void forget() { count_ = 0; }
+  /// In these lanes only.
+  void forget(Mask<S> lanes);
 
-  /// Takes the points whose gap is negative ([Hwangbo 2018]). `clearance`: height of the base
-  /// origin above the ground.
-  void detect_overlapping(const dynamics::Tree<double>& tree, double clearance);
+  /// Takes the points of lanes `live` whose gap is negative ([Hwangbo 2018]). `clearance`: height
+  /// of the base origin above the ground.
+  void detect_overlapping(const dynamics::Tree<S>& tree, S clearance, Mask<S> live) {
+    detect_within(tree, clearance, constant<S>(0), live);
+  }
   /// Takes the points that may touch within h: gap < 2 mm + h (approach speed + largest speed of
   /// any shape). Link velocities are those of the free motion.
-  void detect_reachable(const dynamics::Tree<double>& tree, double clearance,
-                        const Vec3<double>& base_velocity, double h);
-  int count() const { return count_; }
-  /// Numbers that a dense problem takes.
-  static size_t dense_size(int contacts);
-  ActiveContact& active(int i) { return active_[i]; }
-  const ActiveContact& active(int i) const { return active_[i]; }
-  void forget() { count_ = 0; }
+  void detect_reachable(const dynamics::Tree<S>& tree, S clearance, const Vec3<S>& base_velocity,
+                        S h, Mask<S> live);
 
   /// Velocities of the active points from the link velocities.
-  void compute_velocities(const dynamics::Tree<double>& tree, const Vec3<double>& base_velocity);
+  void compute_velocities(const dynamics::Tree<S>& tree, const Vec3<S>& base_velocity);
   /// Speculative contacts: a point at `gap` above the ground may approach with gap / h; one that
   /// overlaps is not pushed out faster than tolerance / h.
-  void allow_closing(double h, double tolerance);
+  void allow_closing(S h, double tolerance);
   /// Accelerations of the points by gravity: the same for all (a floating base falls as a whole),
   /// or from the link velocities, which then hold the acceleration by gravity.
-  void set_gravity(const Vec3<double>& gravity);
-  void take_gravity(const dynamics::Tree<double>& tree);
+  void set_gravity(const Vec3<S>& gravity);
+  void take_gravity(const dynamics::Tree<S>& tree);
   /// Newton's restitution where the gap closes within h. Approach speeds are taken before gravity's
   /// part of the kick, which lasted `fall` [s].
-  void add_restitution(double fall, double h);
-  /// Rows and the factored problem. `with_x`: free velocities come from J u + Y x with the tree's
-  /// x; otherwise from J u.
-  void build_problem(dynamics::Tree<double>& tree, bool with_x);
-  /// Solves; `warm` (3 per support point) is in and out, in force units: impulse = force * h.
-  void solve(const StepSolverOptions& options, double* warm, double h, StepInfo& info);
-  /// Adds Y^T lambda to the tree's x.
-  void add_impulses(dynamics::Tree<double>& tree) const;
-  bool any_impulse() const;
+  void add_restitution(S fall, S h);
+  /// Rows and the factored problem; friction per shape. `with_x`: free velocities come from J u + Y
+  /// x with the tree's x; otherwise from J u.
+  void build_problem(dynamics::Tree<S>& tree, const S* friction, bool with_x);
+  /// Solves; `warm` (3 per support point) is in and out, in force units: impulse = force * h. Lanes
+  /// that are not live keep theirs.
+  void solve(const StepSettings& settings, Mask<S> live, S* warm, S h, LaneInfo<S>& info);
+  /// Adds Y^T lambda to the tree's x in these lanes.
+  void add_impulses(dynamics::Tree<S>& tree, Mask<S> lanes) const;
+  /// Lanes with a contact that pushes.
+  Mask<S> any_impulse() const;
   /// sum lambda . (acceleration of the contact point by gravity) [J/s].
-  double work_rate_of_gravity() const;
+  S work_rate_of_gravity() const;
   /// Energy the impulses gave, sum lambda . (c + G lambda / 2), with c the free velocity before the
   /// shift [J].
-  double work() const;
+  S work() const;
 
-  const double* impulse(int i) const { return problem_.contact(i).impulse; }
-  Vec3<double> velocity_after(int i) const {
-    const double* v = problem_.velocity(i);
+  const S* impulse(int i) const { return problem_.contact(i).impulse; }
+  S friction(int i) const { return problem_.contact(i).friction; }
+  Vec3<S> velocity_after(int i) const {
+    const S* v = problem_.velocity(i);
     return {v[0], v[1], v[2] - active_[i].shift};
   }
-  /// Memory for the methods that need the dense problem; call once before the first such solve.
-  void reserve_explicit();
-  /// The problem written out, dense.
-  ContactProblem explicit_problem() const;
+  const contact::FactoredProblem<S>& problem() const { return problem_; }
 
   /// Displacement that moves overlapping points of the solve to the surface, at the tree's present
-  /// positions, into the tree's x; false if there is nothing to do.
-  bool correct_overlap(dynamics::Tree<double>& tree, double clearance, double tolerance);
+  /// positions, into the tree's x; the lanes in which there is something to do.
+  Mask<S> correct_overlap(dynamics::Tree<S>& tree, S clearance, double tolerance);
 
  private:
-  void add(int shape, int point, const Vec3<double>& position, double gap);
-  /// Takes the points lower than `reach` above the ground.
-  void detect_within(const dynamics::Tree<double>& tree, double clearance, double reach);
-  void solve_explicit(const StepSolverOptions& options, StepInfo& info);
-  /// Where the factored solver ends above its tolerance [m/s]: the first stages of the chain of
-  /// `stickslip::solve` on the dense problem. True, with its answer in place, if that is solved.
-  bool solve_by_chain(double tolerance, StepInfo& info);
-  /// The factored problem as a dense one with its impulses, prepared, in `dense_size` numbers.
-  contact::ExplicitProblem dense_problem(double* memory) const;
+  static constexpr double kReach = 2e-3;  // candidates this near take part whatever their speed [m]
+  static int flat(dynamics::LinkIndex link) { return link.slot * dynamics::kMaxLanes + link.lane; }
+  int links() const { return tables_->num_slots * dynamics::kMaxLanes; }
 
-  std::vector<collide::GroundShape> shapes_;
-  std::vector<collide::PlacedShape> placed_;
-  std::vector<MaterialPair> laws_;
-  int num_points_, num_dofs_;
-  bool floating_;
-  std::vector<ActiveContact> active_;
+  void add(int shape, int point, const Vec3<S>& position, S gap, Mask<S> active);
+  /// Takes the points lower than `reach` above the ground.
+  void detect_within(const dynamics::Tree<S>& tree, S clearance, S reach, Mask<S> live);
+  S fastest_shape(const dynamics::Tree<S>& tree, const Vec3<S>& base_velocity) const;
+  void compute_rows(dynamics::Tree<S>& tree);
+  void number_shared_dofs(const dynamics::Tree<S>& tree);
+  void fill_contact(const dynamics::Tree<S>& tree, const ActiveContact<S>& a, const S* friction,
+                    bool with_x);
+  HostSolver::Effort ask_host(const HostSolver& host, contact::FactoredProblem<double>& p,
+                              double tolerance);
+  void solve_by_method(const HostSolver& host, LaneInfo<S>& info);
+  void solve_by_chain(const HostSolver& host, Mask<S> lanes, double tolerance, S allowed,
+                      LaneInfo<S>& info);
+
+  const RobotTables* tables_;
+  collide::PlacedShape<S>* placed_;
+  ActiveContact<S>* active_;
   int count_ = 0;
-  std::vector<dynamics::LinkIndex> paths_;
-  std::vector<Row3<double>> rows_;
-  std::vector<int> uses_, shared_dof_;       // per slot and lane
-  std::vector<dynamics::LinkIndex> shared_;  // joints that several contacts share
+  // Joints above active contacts, per slot and lane of a bundle.
+  Mask<S>*once_, *shared_;  // lanes where one contact, two or more of them are below
+  int* dof_;                // number among the shared dofs; -1: private in all lanes
+  dynamics::LinkIndex* link_of_dof_;
   int num_shared_ = 0;
-  std::vector<int> index_;
-  std::unique_ptr<char, void (*)(char*)> memory_;
-  std::unique_ptr<char, void (*)(char*)> chain_memory_;
-  contact::FactoredProblem<double> problem_;
-  OverlapCorrection overlap_;
-  std::vector<double> dense_;
+  int* index_;
+  bool* odd_;  // parity of the depth of each shared dof
+  contact::FactoredProblem<S> problem_;
+  OverlapCorrection<S> overlap_;
+  double* dense_;  // a problem for the host
 };
 
-}  // namespace stickslip::step
+}  // namespace stickslip::step::inline STICKSLIP_KERNELS
+
+#include "step/contact_stage.inl"

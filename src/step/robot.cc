@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/bias.h"
 #include "dynamics/mass_matrix.h"
 #include "model/pose.h"
 #include "step/robot_impl.h"
@@ -48,8 +49,11 @@ bool any_nonzero(std::span<const double> values) {
 
 }  // namespace
 
-Robot::Impl::Impl(ModelPtr model, const RobotOptions& options)
-    : data(model, options), query(*model), scratch(query.tree().num_slots), velocity(model->nu()) {}
+Robot::Impl::Impl(ModelPtr model, const RobotOptions& options, const StepSolverOptions& solver)
+    : data(model, options, solver),
+      query(*model),
+      scratch(query.tree().num_slots),
+      velocity(model->nu()) {}
 
 dynamics::Tree<double>& Robot::Impl::tree_at_state() {
   dynamics::Tree<double>& t = query.tree();
@@ -99,9 +103,8 @@ void Robot::set_state(std::span<const double> q, std::span<const double> u) {
   std::fill(s.impulse.begin(), s.impulse.end(), 0.0);
   std::fill(s.drift_acceleration.begin(), s.drift_acceleration.end(), 0.0);
   s.pending_gravity = 0;
-  d.prepared_step = 0;
   s.fresh = true;
-  d.contacts.forget();
+  d.forget_step();
 }
 
 void Robot::set_generalized_force(std::span<const double> tau) {
@@ -121,7 +124,7 @@ void Robot::set_pd_gains(std::span<const double> kp, std::span<const double> kd)
   std::copy(kp.begin(), kp.end(), c.kp.begin());
   std::copy(kd.begin(), kd.end(), c.kd.begin());
   c.pd = any_nonzero(kp) || any_nonzero(kd);
-  impl_->data.prepared_step = 0;  // the factor holds the gains
+  impl_->data.lanes.prepared_step = 0;  // the factor holds the gains
 }
 
 void Robot::set_pd_target(std::span<const double> target) {
@@ -296,8 +299,8 @@ void Robot::delassus(std::span<const int> bodies, std::span<const Vector3> point
   dynamics::factor_mass_matrix<double>(t, nullptr);
   const Vec3<double> base = d.base_position(d.state.q.data());
   std::vector<double> y(3 * n * nu, 0.0);
-  std::vector<LinkIndex> path(d.memory.max_depth() + 1);
-  std::vector<Row3<double>> joint(d.memory.max_depth() + 1);
+  std::vector<LinkIndex> path(d.scene.tables().max_depth + 1);
+  std::vector<Row3<double>> joint(d.scene.tables().max_depth + 1);
   for (size_t i = 0; i < n; ++i) {
     if (bodies[i] < 0 || bodies[i] >= static_cast<int>(model().bodies().size()))
       throw ModelError("delassus: bodies[" + std::to_string(i) +
@@ -330,13 +333,13 @@ std::span<const Contact> Robot::contacts() const {
 }
 
 void Robot::Impl::collect_contacts() {
-  const step::ContactStage& stage = data.contacts;
+  const step::ContactStage<double>& stage = data.contacts();
   contacts.clear();
   for (int i = 0; i < stage.count(); ++i) {
-    const step::ActiveContact& a = stage.active(i);
-    const collide::GroundShape& shape = stage.shapes()[a.shape];
+    const step::ActiveContact<double>& a = stage.active(i);
+    const collide::GroundShape& shape = data.scene.shapes()[a.shape];
     const double* l = stage.impulse(i);
-    const Vec3<double> v = stage.velocity_after(i), p = a.position + data.contact_origin;
+    const Vec3<double> v = stage.velocity_after(i), p = a.position + data.lanes.contact_origin;
     contacts.push_back({index,
                         shape.body,
                         shape.shape,
@@ -344,7 +347,7 @@ void Robot::Impl::collect_contacts() {
                         {p.x, p.y, p.z},
                         {0, 0, 1},
                         a.gap,
-                        stage.law(a.shape).friction,
+                        data.scene.law(a.shape).friction,
                         {l[0], l[1], l[2]},
                         {v.x, v.y, v.z}});
   }

@@ -1,86 +1,97 @@
 #include "step/robot_data.h"
 
-#include "lane/math.h"
+#include <algorithm>
+#include <new>
+
+#include "step/integrators.h"
 
 namespace stickslip::step {
+namespace {
 
-RobotData::RobotData(ModelPtr m, const RobotOptions& options)
+void free_block(char* block) { ::operator delete(block, std::align_val_t(64)); }
+
+/// Lays the lanes out in a block of their own.
+std::unique_ptr<char, void (*)(char*)> give_memory(RobotLanes<double>& lanes,
+                                                   const RobotTables& tables) {
+  contact::Arena count(nullptr);
+  lanes.lay_out(count, tables);
+  const size_t bytes = static_cast<size_t>(count.used());
+  std::unique_ptr<char, void (*)(char*)> block(
+      static_cast<char*>(::operator new(bytes, std::align_val_t(64))), free_block);
+  std::fill(block.get(), block.get() + bytes, 0);
+  contact::Arena arena(block.get());
+  lanes.lay_out(arena, tables);
+  return block;
+}
+
+}  // namespace
+
+RobotData::RobotData(ModelPtr m, const RobotOptions& o, const StepSolverOptions& solver)
     : model(m),
-      name(options.name.empty() ? m->name() : options.name),
-      material(options.material),
+      name(o.name.empty() ? m->name() : o.name),
+      material(o.material),
+      options(o),
       memory(*m),
-      contacts(*m, memory.layout(), memory.max_depth()) {
-  const int nq = m->nq(), nu = m->nu(), joints = m->num_joints();
-  state.q.assign(nq, 0);
+      scene(*m, memory.layout(), o),
+      host(scene.tables().num_points, solver),
+      block_(give_memory(lanes, scene.tables())) {
+  const int nu = m->nu(), joints = m->num_joints();
+  state.q.assign(m->nq(), 0);
   state.u.assign(nu, 0);
-  state.impulse.assign(3 * contacts.num_points(), 0);
+  state.impulse.assign(3 * scene.tables().num_points, 0);
   state.drift_acceleration.assign(nu, 0);
-  const auto& o = options.orientation;
-  fixed_position = {options.position[0], options.position[1], options.position[2]};
-  for (int k = 0; k < 4; ++k) fixed_quaternion[k] = o[k];
   if (floating()) {
-    for (int k = 0; k < 3; ++k) state.q[k] = options.position[k];
-    for (int k = 0; k < 4; ++k) state.q[3 + k] = o[k];
+    std::copy(o.position.begin(), o.position.end(), state.q.begin());
+    std::copy(o.orientation.begin(), o.orientation.end(), state.q.begin() + 3);
   }
   control.generalized_force.assign(nu, 0);
   control.kp.assign(joints, 0);
   control.kd.assign(joints, 0);
   control.target.assign(joints, 0);
-  for (const Joint& j : m->joints()) {
-    damping.push_back(j.damping);
-    damped = damped || j.damping > 0;
-  }
-  backup = state;  // sized here: a step allocates nothing
-  q_new.resize(nq);
-  implicit.resize(joints);
-  for (auto* v : {&u_free, &u_plus, &rates, &force, &delta, &gravity_acceleration})
-    v->assign(nu, 0);
+  lanes.tree = &memory.tree();
+  lanes.contact_origin = zero3<double>();
+  lanes.prepared_step = 0;
 }
 
-void integrate_configuration(const RobotData& robot, double* q, const double* v, double h) {
-  const int joints = robot.num_joints();
-  if (!robot.floating()) {
-    for (int j = 0; j < joints; ++j) q[j] = madd(h, v[j], q[j]);
-    return;
-  }
-  for (int k = 0; k < 3; ++k) q[k] = madd(h, v[k], q[k]);
-  for (int j = 0; j < joints; ++j) q[7 + j] = madd(h, v[6 + j], q[7 + j]);
-  // exp(h w / 2) q, with sin(t)/t from its series where the division would lose digits.
-  const double half = 0.5 * h;
-  const Vec3<double> r{half * v[3], half * v[4], half * v[5]};
-  const double t2 = dot(r, r), t = sqrt(t2);
-  double s, c;
-  sincos(t, s, c);
-  const double sinc = t > 1e-4 ? s / t : 1 - t2 / 6;
-  const Vec3<double> e = r * sinc;
-  double* p = q + 3;
-  const double w = p[0], x = p[1], y = p[2], z = p[3];
-  const double n[4] = {c * w - e.x * x - e.y * y - e.z * z, c * x + e.x * w + e.y * z - e.z * y,
-                       c * y + e.y * w + e.z * x - e.x * z, c * z + e.z * w + e.x * y - e.y * x};
-  const double inv = 1 / sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2] + n[3] * n[3]);
-  for (int k = 0; k < 4; ++k) p[k] = n[k] * inv;
+void RobotData::forget_step() {
+  lanes.prepared_step = 0;
+  lanes.contacts.forget();
 }
 
-const double* implicit_diagonal(RobotData& robot, double h) {
-  if (!robot.control.pd && !robot.damped) return nullptr;
-  for (int j = 0; j < robot.num_joints(); ++j)
-    robot.implicit[j] = h * (robot.control.kd[j] + robot.damping[j] + h * robot.control.kp[j]);
-  return robot.implicit.data();
-}
-
-bool control_force(RobotData& robot, const double* q, const double* u, double h, double* out) {
-  const RobotControl& c = robot.control;
-  if (!c.pd && !c.force && !robot.damped) return false;
-  const int offset = robot.offset();
-  for (int k = 0; k < offset; ++k) out[k] = c.generalized_force[k];
-  const double* joints = robot.joints(q);
-  for (int j = 0; j < robot.num_joints(); ++j) {
-    const double rate = u[offset + j];
-    out[offset + j] = c.generalized_force[offset + j] +
-                      c.kp[j] * (c.target[j] - joints[j] - h * rate) -
-                      (c.kd[j] + robot.damping[j]) * rate;
-  }
-  return true;
+void RobotData::step(StepSettings settings, const Vec3<double>& gravity) {
+  LaneState<double>& s = lanes.state;
+  s = {state.q.data(),        state.u.data(), state.impulse.data(), state.drift_acceleration.data(),
+       state.pending_gravity, state.fresh};
+  const RobotControl& c = control;
+  const bool on_base = c.force && floating() &&
+                       std::any_of(c.generalized_force.begin(), c.generalized_force.begin() + 6,
+                                   [](double x) { return x != 0; });
+  lanes.control = {c.generalized_force.data(),
+                   c.kp.data(),
+                   c.kd.data(),
+                   c.target.data(),
+                   scene.friction().data(),
+                   nullptr,
+                   nullptr,
+                   gravity,
+                   c.pd,
+                   c.force,
+                   c.pd || c.force,
+                   on_base};
+  settings.host = host.view();
+  if (settings.energy_safe)
+    step_energy_safe(lanes, settings);
+  else
+    step_semi_implicit(lanes, settings);
+  state.pending_gravity = s.pending_gravity;
+  state.fresh = s.fresh;
+  const LaneInfo<double>& i = lanes.info;
+  info = {StepStatus::kOk, i.contacts, i.sweeps, i.newton_steps, i.substeps, i.residual};
+  if (i.unconverged) info.status = StepStatus::kNotConverged;
+  if (i.non_finite)
+    info.status = StepStatus::kNonFinite;
+  else
+    state.time += settings.time_step;
 }
 
 }  // namespace stickslip::step

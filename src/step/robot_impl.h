@@ -6,7 +6,7 @@
 namespace stickslip {
 
 struct Robot::Impl {
-  Impl(ModelPtr model, const RobotOptions& options);
+  Impl(ModelPtr model, const RobotOptions& options, const StepSolverOptions& solver);
 
   /// The query tree with positions and inertias at the present q.
   dynamics::Tree<double>& tree_at_state();

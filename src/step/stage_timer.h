@@ -1,29 +1,29 @@
-// Adds the time of a scope's stages to StageTimes; does nothing (one branch) when the world is not
-// profiled.
+// Adds the time of a scope's stages to the settings' counters; does nothing (one branch) when the
+// step is not profiled.
 #pragma once
-#include <stickslip/world.h>
+#include "lane/lane.h"
+#include "step/step_tables.h"
 
-#include <chrono>
-
-namespace stickslip::step {
+namespace stickslip::step::inline STICKSLIP_KERNELS {
 
 class StageTimer {
  public:
-  explicit StageTimer(StageTimes* times) : times_(times) {
-    if (times_) last_ = Clock::now();
+  explicit StageTimer(const StepSettings& settings)
+      : clock_(settings.clock), stages_(settings.stages) {
+    if (clock_) last_ = clock_();
   }
   /// Ends a stage: the time since the last call belongs to it.
-  void end(double StageTimes::* stage) {
-    if (!times_) return;
-    const Clock::time_point now = Clock::now();
-    times_->*stage += std::chrono::duration<double>(now - last_).count();
+  void end(Stage stage) {
+    if (!clock_) return;
+    const double now = clock_();
+    stages_[stage] += now - last_;
     last_ = now;
   }
 
  private:
-  using Clock = std::chrono::steady_clock;
-  StageTimes* times_;
-  Clock::time_point last_;
+  Clock clock_;
+  double* stages_;
+  double last_ = 0;
 };
 
-}  // namespace stickslip::step
+}  // namespace stickslip::step::inline STICKSLIP_KERNELS

@@ -1,18 +1,32 @@
 // The public World: robots, ground, materials; a step is every robot's step.
 #include <stickslip/errors.h>
 
+#include <algorithm>
 #include <cmath>
-#include <map>
 #include <set>
 
 #include "solvers/validate.h"
-#include "step/robot_impl.h"
 #include "step/snapshot.h"
+#include "step/world_impl.h"
 
 namespace stickslip {
 namespace {
 
 [[noreturn]] void reject(const std::string& what) { throw ModelError(what); }
+
+/// The problem of the last step, dense; empty without contacts.
+ContactProblem explicit_problem(const step::ContactStage<double>& contacts) {
+  ContactProblem p;
+  const size_t n = contacts.count();
+  if (n == 0) return p;  // the factored problem may be an older step's
+  p.delassus.resize(9 * n * n);
+  p.free_velocity.resize(3 * n);
+  p.friction.resize(n);
+  std::vector<double> lambda(3 * n);
+  contact::write_out(contacts.problem(), p.delassus.data(), p.free_velocity.data(),
+                     p.friction.data(), lambda.data());
+  return p;
+}
 
 std::pair<std::string, std::string> ordered(const std::string& a, const std::string& b) {
   return a < b ? std::pair{a, b} : std::pair{b, a};
@@ -37,59 +51,41 @@ void WorldOptions::validate() const {
         "the others");
 }
 
-struct World::Impl {
-  explicit Impl(const WorldOptions& o) : options(o) {
-    context.time_step = o.time_step;
-    context.gravity = {o.gravity[0], o.gravity[1], o.gravity[2]};
-    context.ground = false;
-    context.ground_height = 0;
-    context.max_substeps = o.max_substeps;
-    context.times = nullptr;
-  }
+World::Impl::Impl(const WorldOptions& o)
+    : options(o),
+      settings(step::step_settings(o)),
+      gravity{o.gravity[0], o.gravity[1], o.gravity[2]} {
+  settings.stages = stages;
+}
 
-  MaterialPair pair(const std::string& a, const std::string& b) const {
-    const auto found = pairs.find(ordered(a, b));
-    return found == pairs.end() ? MaterialPair{} : found->second;
-  }
-  void refresh_laws() {
-    for (auto& robot : robots) {
-      step::RobotData& d = robot->impl_->data;
-      for (size_t k = 0; k < d.contacts.shapes().size(); ++k) {
-        const std::string& own = d.model->shapes()[d.contacts.shapes()[k].shape].material;
-        d.contacts.laws()[k] = pair(own.empty() ? d.material : own, ground_material);
-      }
+MaterialPair World::Impl::pair(const std::string& a, const std::string& b) const {
+  const auto found = pairs.find(ordered(a, b));
+  return found == pairs.end() ? MaterialPair{} : found->second;
+}
+
+void World::Impl::refresh_laws() {
+  for (int r = 0; r < static_cast<int>(robots.size()); ++r) {
+    step::RobotData& d = data(r);
+    for (int k = 0; k < d.scene.tables().num_shapes; ++k) {
+      const std::string& own = d.model->shapes()[d.scene.shapes()[k].shape].material;
+      d.scene.set_law(k, pair(own.empty() ? d.material : own, ground_material));
     }
   }
-  void step_one(step::RobotData& d) {
-    if (options.integrator == Integrator::kSemiImplicit)
-      step_semi_implicit(d, context);
-    else
-      step_energy_safe(d, context);
-  }
-
-  WorldOptions options;
-  step::StepContext context;
-  std::string ground_material = "default";
-  std::map<std::pair<std::string, std::string>, MaterialPair> pairs;
-  std::vector<std::unique_ptr<Robot>> robots;
-  StageTimes times;
-  double time = 0;
-};
+}
 
 World::World(const WorldOptions& options) {
   options.validate();
   impl_ = std::make_unique<Impl>(options);
-  impl_->context.solver = &impl_->options.solver;
 }
 World::~World() = default;
 World::World(World&&) noexcept = default;
 World& World::operator=(World&&) noexcept = default;
 
 void World::add_ground(double height, const std::string& material) {
-  if (impl_->context.ground) reject("add_ground: the world has a ground already");
+  if (impl_->settings.ground) reject("add_ground: the world has a ground already");
   if (!std::isfinite(height)) reject("add_ground: height is not finite");
-  impl_->context.ground = true;
-  impl_->context.ground_height = height;
+  impl_->settings.ground = true;
+  impl_->settings.ground_height = height;
   impl_->ground_material = material;
   impl_->refresh_laws();
 }
@@ -113,12 +109,10 @@ Robot& World::add_robot(ModelPtr model, const RobotOptions& given) {
     o.name = model->name();
     for (int k = 2; names.count(o.name); ++k) o.name = model->name() + "_" + std::to_string(k);
   }
-  auto robot_impl = std::make_unique<Robot::Impl>(model, o);
-  robot_impl->gravity = impl_->context.gravity;
+  auto robot_impl = std::make_unique<Robot::Impl>(model, o, impl_->options.solver);
+  robot_impl->gravity = impl_->gravity;
   robot_impl->index = num_robots();
-  robot_impl->contacts.reserve(robot_impl->data.contacts.num_points());
-  if (impl_->options.solver.method != SolveMethod::kAuto)
-    robot_impl->data.contacts.reserve_explicit();
+  robot_impl->contacts.reserve(robot_impl->data.scene.tables().num_points);
   robot_impl->data.state.time = impl_->time;
   impl_->robots.push_back(std::unique_ptr<Robot>(new Robot(std::move(robot_impl))));
   impl_->refresh_laws();
@@ -153,11 +147,11 @@ StepStatus World::step(int steps) {
   for (int k = 0; k < steps; ++k) {
     for (auto& robot : impl_->robots) {
       step::RobotData& d = robot->impl_->data;
-      impl_->step_one(d);
+      d.step(impl_->settings, impl_->gravity);
       status |= static_cast<std::uint32_t>(d.info.status);
     }
     impl_->time += impl_->options.time_step;
-    if (impl_->context.times) ++impl_->times.steps;
+    if (impl_->settings.clock) ++impl_->profiled_steps;
   }
   return static_cast<StepStatus>(status);
 }
@@ -176,8 +170,7 @@ void World::load_state(std::span<const std::uint8_t> blob) {
   for (size_t k = 0; k < snapshot.robots.size(); ++k) {
     step::RobotData& d = impl_->robots[k]->impl_->data;
     d.state = snapshot.robots[k];
-    d.prepared_step = 0;
-    d.contacts.forget();
+    d.forget_step();
   }
 }
 
@@ -186,27 +179,34 @@ ContactProblem World::next_contact_problem(int index) {
   step::RobotData& d = r.impl_->data;
   const step::RobotState before = d.state;
   const StepInfo info = d.info;
-  impl_->step_one(d);
-  ContactProblem p = d.contacts.explicit_problem();
+  d.step(impl_->settings, impl_->gravity);
+  ContactProblem p = explicit_problem(d.contacts());
   d.state = before;
   d.info = info;
-  d.prepared_step = 0;
-  d.contacts.forget();
+  d.forget_step();
   return p;
 }
 
 ContactProblem World::last_contact_problem(int index, std::vector<double>* impulse) const {
-  const step::ContactStage& contacts = robot(index).impl_->data.contacts;
+  const step::ContactStage<double>& contacts = robot(index).impl_->data.contacts();
   if (impulse) {
     impulse->clear();
     for (int i = 0; i < contacts.count(); ++i)
       impulse->insert(impulse->end(), contacts.impulse(i), contacts.impulse(i) + 3);
   }
-  return contacts.explicit_problem();
+  return explicit_problem(contacts);
 }
 
-void World::set_profiling(bool on) { impl_->context.times = on ? &impl_->times : nullptr; }
-const StageTimes& World::stage_times() const { return impl_->times; }
-void World::reset_stage_times() { impl_->times = StageTimes{}; }
+void World::set_profiling(bool on) { impl_->settings.clock = on ? step::clock_seconds : nullptr; }
+const StageTimes& World::stage_times() const {
+  const double* t = impl_->stages;
+  impl_->times = {t[step::kDynamics], t[step::kDetection], t[step::kDelassus],
+                  t[step::kSolve],    t[step::kIntegrate], impl_->profiled_steps};
+  return impl_->times;
+}
+void World::reset_stage_times() {
+  std::fill(std::begin(impl_->stages), std::end(impl_->stages), 0.0);
+  impl_->profiled_steps = 0;
+}
 
 }  // namespace stickslip

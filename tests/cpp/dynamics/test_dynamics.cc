@@ -65,8 +65,8 @@ std::vector<S> run_kernels(const Model& model, const std::vector<std::vector<dou
   out.push_back(squared_norm(t));
   const Spatial<S> p = base_momentum(t);
   out.insert(out.end(), {p.ang.x, p.ang.y, p.ang.z, p.lin.x, p.lin.y, p.lin.z});
-  std::vector<LinkIndex> path(memory.max_depth() + 1);
-  std::vector<Row3<S>> rows(memory.max_depth() + 1);
+  std::vector<LinkIndex> path(model.num_joints());
+  std::vector<Row3<S>> rows(model.num_joints());
   for (const LinkIndex& link : memory.layout().link_of_body) {
     ContactRows<S> r{0, path.data(), rows.data(), {}};
     const S half = constant<S>(0.5), o = constant<S>(0);

@@ -1,0 +1,94 @@
+// Drives of the joints, forces of the user, and how a velocity moves a configuration.
+#pragma once
+#include "lane/math.h"
+#include "step/robot_lanes.h"
+
+namespace stickslip::step::inline STICKSLIP_KERNELS {
+
+/// q <- q (+) h v: positions and joints add, the base quaternion turns by the exponential map.
+template <class S>
+void integrate_configuration(const RobotTables& t, S* q, const S* v, S h) {
+  const int joints = t.num_joints;
+  if (!t.floating) {
+    for (int j = 0; j < joints; ++j) q[j] = madd(h, v[j], q[j]);
+    return;
+  }
+  for (int k = 0; k < 3; ++k) q[k] = madd(h, v[k], q[k]);
+  for (int j = 0; j < joints; ++j) q[7 + j] = madd(h, v[6 + j], q[7 + j]);
+  // exp(h w / 2) q, with sin(t)/t from its series where the division would lose digits.
+  const S one = constant<S>(1), half = constant<S>(0.5) * h;
+  const Vec3<S> r{half * v[3], half * v[4], half * v[5]};
+  const S t2 = dot(r, r), angle = sqrt(t2);
+  S s, c;
+  sincos(angle, s, c);
+  const auto large = angle > constant<S>(1e-4);
+  const S sinc = select(large, s / select(large, angle, one), one - t2 * constant<S>(1.0 / 6));
+  const Vec3<S> e = r * sinc;
+  S* p = q + 3;
+  const S w = p[0], x = p[1], y = p[2], z = p[3];
+  const S n[4] = {c * w - e.x * x - e.y * y - e.z * z, c * x + e.x * w + e.y * z - e.z * y,
+                  c * y + e.y * w + e.z * x - e.x * z, c * z + e.z * w + e.x * y - e.y * x};
+  const S inv = one / sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2] + n[3] * n[3]);
+  for (int k = 0; k < 4; ++k) p[k] = n[k] * inv;
+}
+
+/// Joint-space diagonal that makes damping and PD control implicit over h: h (kd + damping) + h^2
+/// kp, docs/theory/step.md (S2). Null if there is none.
+template <class S>
+const S* implicit_diagonal(RobotLanes<S>& robot, S h) {
+  const RobotTables& t = *robot.tables;
+  if (!robot.control.pd && !t.damped) return nullptr;
+  for (int j = 0; j < t.num_joints; ++j) {
+    const S damping = constant<S>(t.damping[j]);
+    robot.implicit[j] = h * (robot.control.kd[j] + damping + h * robot.control.kp[j]);
+  }
+  return robot.implicit;
+}
+
+/// Generalized force of control over a step h at velocity u: user's force, PD (target - q - h u),
+/// damping, into robot.force; wrenches as forces on the links. False if no lane has any.
+template <class S>
+bool control_force(RobotLanes<S>& robot, const S* q, const S* u, S h) {
+  const RobotTables& t = *robot.tables;
+  const LaneControl<S>& c = robot.control;
+  if (!c.pd && !c.force && !t.damped) return false;
+  const int offset = robot.offset();
+  for (int k = 0; k < offset; ++k) robot.force[k] = c.generalized_force[k];
+  const S* joints = robot.joints(q);
+  for (int j = 0; j < t.num_joints; ++j) {
+    const S rate = u[offset + j];
+    robot.force[offset + j] = c.generalized_force[offset + j] +
+                              c.kp[j] * (c.target[j] - joints[j] - h * rate) -
+                              (c.kd[j] + constant<S>(t.damping[j])) * rate;
+  }
+  return true;
+}
+
+/// The part of robot.force that acts on the base.
+template <class S>
+Spatial<S> base_control(const RobotLanes<S>& robot) {
+  if (!robot.tables->floating) return zero_spatial<S>();
+  const S* f = robot.force;
+  return {{f[3], f[4], f[5]}, {f[0], f[1], f[2]}};
+}
+
+/// A wrench at the center of mass of a body as a force at the base origin.
+template <class S>
+STICKSLIP_INLINE Spatial<S> at_reference(const Spatial<S>& wrench, const RigidInertia<S>& body) {
+  const auto heavy = body.mass > constant<S>(0);
+  const S inverse = constant<S>(1) / select(heavy, body.mass, constant<S>(1));
+  return {cross(body.h * inverse, wrench.lin, wrench.ang), wrench.lin};
+}
+
+/// Adds the users' wrenches to the forces on base and links.
+template <class S>
+void add_wrenches(RobotLanes<S>& robot) {
+  if (!robot.control.wrenches) return;
+  dynamics::Tree<S>& t = *robot.tree;
+  t.base.force = t.base.force + at_reference(*robot.control.base_wrench, t.base.inertia);
+  for (int slot = 0; slot < t.num_slots; ++slot)
+    t.links[slot].force =
+        t.links[slot].force + at_reference(robot.control.wrenches[slot], t.links[slot].inertia);
+}
+
+}  // namespace stickslip::step::inline STICKSLIP_KERNELS

@@ -1,0 +1,37 @@
+// The contact solvers that a step calls outside its kernels: the paper's methods where a world asks
+// for one, and the first stages of the chain of `stickslip::solve` where the factored solver ends
+// above its tolerance. Memory is taken once.
+#pragma once
+#include <stickslip/world.h>
+
+#include <memory>
+#include <vector>
+
+#include "step/step_tables.h"
+
+namespace stickslip::step {
+
+class SolverOnHost {
+ public:
+  /// For problems of up to `max_points` contacts.
+  SolverOnHost(int max_points, const StepSolverOptions& options);
+
+  /// What the step calls; valid as long as this object stays where it is.
+  HostSolver view();
+
+ private:
+  static HostSolver::Effort run_chain(void* self, DenseProblem& problem, double tolerance);
+  static HostSolver::Effort run_method(void* self, DenseProblem& problem, double tolerance);
+
+  StepSolverOptions options_;
+  int max_contacts_;
+  std::unique_ptr<char, void (*)(char*)> memory_;
+};
+
+/// Seconds of a steady clock.
+double clock_seconds();
+
+/// What a step reads of a world's options; ground and host solver are the owner's to fill in.
+StepSettings step_settings(const WorldOptions& options);
+
+}  // namespace stickslip::step

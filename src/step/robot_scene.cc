@@ -1,0 +1,61 @@
+#include "step/robot_scene.h"
+
+#include <algorithm>
+
+namespace stickslip::step {
+namespace {
+
+int longest_path(const dynamics::TreeLayout& layout) {
+  int deepest = 0;
+  for (int j = 0; j < layout.num_joints; ++j) {
+    int depth = 0;
+    for (int k = j; k >= 0; k = layout.parent_joint[k]) ++depth;
+    deepest = std::max(deepest, depth);
+  }
+  return deepest;
+}
+
+}  // namespace
+
+RobotScene::RobotScene(const Model& model, const dynamics::TreeLayout& layout,
+                       const RobotOptions& options)
+    : shapes_(collide::ground_shapes(model, layout)),
+      laws_(shapes_.size()),
+      friction_(shapes_.size()),
+      restitution_(shapes_.size()),
+      threshold_(shapes_.size()),
+      prismatic_(new bool[model.num_joints()]),
+      tables_{} {
+  for (size_t k = 0; k < shapes_.size(); ++k) set_law(static_cast<int>(k), {});
+  for (int j = 0; j < model.num_joints(); ++j) {
+    const Joint& joint = model.joints()[j];
+    damping_.push_back(joint.damping);
+    tables_.damped = tables_.damped || joint.damping > 0;
+    prismatic_[j] = joint.type == JointType::kPrismatic;
+  }
+  RobotTables& t = tables_;
+  t.floating = layout.floating;
+  t.nq = model.nq(), t.nu = model.nu();
+  t.num_joints = model.num_joints(), t.num_bodies = static_cast<int>(model.bodies().size());
+  t.num_slots = layout.num_slots;
+  t.max_depth = longest_path(layout);
+  t.num_shapes = static_cast<int>(shapes_.size());
+  t.num_points = collide::total_points(shapes_);
+  t.shapes = shapes_.data();
+  t.restitution = restitution_.data();
+  t.restitution_threshold = threshold_.data();
+  t.damping = damping_.data();
+  t.prismatic = prismatic_.get();
+  t.body_links = layout.link_of_body.data();
+  std::copy(options.position.begin(), options.position.end(), t.fixed_position);
+  std::copy(options.orientation.begin(), options.orientation.end(), t.fixed_quaternion);
+}
+
+void RobotScene::set_law(int shape, const MaterialPair& law) {
+  laws_[shape] = law;
+  friction_[shape] = law.friction;
+  restitution_[shape] = law.restitution;
+  threshold_[shape] = law.restitution_threshold;
+}
+
+}  // namespace stickslip::step

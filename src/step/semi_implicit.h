@@ -1,0 +1,89 @@
+// The paper's step, [Hwangbo 2018] section II: semi-implicit Euler, contact at velocity level, no
+// position correction.
+//
+//   M (u+ - u) = dt (tau - h) + J^T lambda,   q+ = q (+) dt u+
+// Where we differ: damping and PD control are implicit in the rates; M is never inverted nor
+// formed (docs/theory/step.md (S1), (S2)).
+#pragma once
+#include "dynamics/bias.h"
+#include "step/control.h"
+#include "step/stage_timer.h"
+
+namespace stickslip::step::inline STICKSLIP_KERNELS {
+
+/// x <- dt x for all of L-space.
+template <class S>
+STICKSLIP_INLINE void scale_x(dynamics::Tree<S>& t, double dt) {
+  for (S& x : t.base.x) x = x * constant<S>(dt);
+  for (int slot = 0; slot < t.num_slots; ++slot)
+    t.links[slot].x = t.links[slot].x * constant<dynamics::Wide<S>>(dt);
+}
+
+/// One time step. The state of a lane only changes if its result is finite.
+template <class S>
+void step_semi_implicit(RobotLanes<S>& robot, const StepSettings& settings) {
+  StageTimer timer(settings);
+  const RobotTables& tables = *robot.tables;
+  dynamics::Tree<S>& t = *robot.tree;
+  LaneState<S>& s = robot.state;
+  const S zero = constant<S>(0), dt = constant<S>(settings.time_step);
+  const int offset = robot.offset(), nq = tables.nq, nu = tables.nu;
+  robot.info = LaneInfo<S>{none<S>(), none<S>(), zero};
+  copy(s.impulse, 3 * tables.num_points, robot.backup.impulse);
+
+  // Kinematics, bias and factor; x = L^-T dt (tau - h), the free velocity change in L-space.
+  robot.compute_positions(s.q);
+  dynamics::compute_inertias(t);
+  dynamics::factor_mass_matrix<S>(t, implicit_diagonal(robot, dt));
+  dynamics::compute_bias<S>(t, robot.angular(s.u), s.u + offset, robot.control.gravity);
+  const bool driven = control_force(robot, s.q, s.u, dt);
+  if (driven) t.base.force = t.base.force + base_control(robot);
+  add_wrenches(robot);
+  dynamics::solve_lower_transposed<S>(t, driven ? robot.force + offset : nullptr,
+                                      dynamics::LinkForces::kAll);
+  scale_x(t, settings.time_step);
+  timer.end(kDynamics);
+
+  // Contacts: overlapping points only.
+  ContactStage<S>& contacts = robot.contacts;
+  const Mask<S> everywhere = !none<S>();
+  contacts.forget();
+  robot.contact_origin = robot.base_position(s.q);
+  if (settings.ground)
+    contacts.detect_overlapping(t, robot.contact_origin.z - constant<S>(settings.ground_height),
+                                everywhere);
+  contacts.compute_velocities(t, robot.linear(s.u));
+  contacts.add_restitution(zero, dt);
+  timer.end(kDetection);
+  if (contacts.count() > 0) {
+    contacts.build_problem(t, robot.control.friction, true);
+    timer.end(kDelassus);
+    contacts.solve(settings, everywhere, s.impulse, dt, robot.info);
+    contacts.add_impulses(t, everywhere);
+    timer.end(kSolve);
+  } else {
+    for (int k = 0; k < 3 * tables.num_points; ++k) s.impulse[k] = zero;
+  }
+
+  // u+ = u + L^-1 (x + Y^T lambda), q+ = q (+) dt u+. A zero is +0, whichever way it came about.
+  S base[6], *next = robot.u_plus, *q_new = robot.q_new;
+  dynamics::solve_lower(t, base, next + offset);
+  for (int k = 0; k < offset; ++k) next[k] = s.u[k] + base[k] + zero;
+  for (int j = offset; j < nu; ++j) next[j] = s.u[j] + next[j] + zero;
+  copy(s.q, nq, q_new);
+  integrate_configuration(tables, q_new, next, dt);
+  for (int k = 0; k < nq; ++k) q_new[k] = q_new[k] + zero;
+  const Mask<S> finite = is_finite(sum_of_sizes(q_new, nq, sum_of_sizes(next, nu, zero)));
+  copy_where(finite, q_new, nq, s.q);
+  copy_where(finite, next, nu, s.u);
+  if (!all(finite)) {
+    copy_where(!finite, robot.backup.impulse, 3 * tables.num_points, s.impulse);
+    contacts.forget(!finite);
+    robot.info.non_finite = !finite;
+    robot.info.unconverged = robot.info.unconverged & finite;
+    robot.info.residual = select(finite, robot.info.residual, zero);
+  }
+  timer.end(kIntegrate);
+}
+
+}  // namespace stickslip::step::inline STICKSLIP_KERNELS

@@ -1,0 +1,113 @@
+"""Tasks that users write, and the random streams they draw from."""
+
+from __future__ import annotations
+
+import runpy
+import warnings
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import stickslip as ss
+from stickslip.envs import RandomStreams, VectorTask, register
+
+if not hasattr(ss, "Batch"):
+    pytest.skip("needs stickslip.Batch", allow_module_level=True)
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+class Falling(VectorTask):
+    """A ball falls; the smallest task there is."""
+
+    episode_seconds = 0.1
+    action_size = 1
+
+    def make_world(self) -> ss.World:
+        builder = ss.ModelBuilder("ball")
+        builder.add_link("ball", mass=1.0, inertia=0.01 * np.eye(3))
+        builder.add_shape("ball", "sphere", [0.1])
+        world = ss.World(self.time_step)
+        world.add_ground()
+        world.add_robot(builder.build(), position=(0, 0, 1))
+        return world
+
+    def apply(self, actions: np.ndarray) -> None:
+        self.batch.generalized_force[:, 2] = actions[:, 0]
+
+    def observe(self) -> np.ndarray:
+        return self.batch.q[:, 2:3]
+
+    def rewards(self) -> np.ndarray:
+        return self.batch.q[:, 2]
+
+
+def test_smallest_task_runs_in_every_mode_and_alone() -> None:
+    register("tests/Falling-v0", Falling)
+    for mode in ("NextStep", "SameStep", "Disabled"):
+        envs = gymnasium.make_vec("tests/Falling-v0", num_envs=3, autoreset_mode=mode)
+        envs.reset(seed=0)
+        results = [envs.step(np.ones((3, 1))) for _ in range(5)]
+        assert results[-1][3].all() and not results[-1][2].any()
+        ended = results[-1][4]["final_info"] if mode == "SameStep" else results[-1][4]
+        assert np.allclose(ended["reward_terms"]["reward"], sum(result[1] for result in results))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(gymnasium.make("tests/Falling-v0").unwrapped)
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "words"),
+    [
+        ({"observe": lambda self: np.zeros(3)}, ValueError, r"observe\(\) returned shape \(3,\)"),
+        ({"rewards": lambda self: np.zeros((3, 1))}, ValueError, r"rewards\(\): 'reward' has shape \(3, 1\)"),
+        ({"terminations": lambda self: {"end": np.zeros(3)}}, TypeError, "'end' has dtype float64; bool"),
+        ({"rewards": VectorTask.rewards}, NotImplementedError, r"Broken needs a method rewards\(\)"),
+    ],
+)
+def test_mistakes_in_a_task_are_named(change: dict[str, Any], error: type, words: str) -> None:
+    with pytest.raises(error, match=words):
+        envs = type("Broken", (Falling,), change)(3)
+        envs.reset(seed=0)
+        envs.step(np.zeros((3, 1)))
+
+
+def test_example_jumps(capsys) -> None:
+    module = SimpleNamespace(**runpy.run_path(str(ROOT / "examples" / "write_your_own_task.py")))
+    module.check()
+    assert "bases rose to" in capsys.readouterr().out
+
+
+def test_page_shows_the_example() -> None:
+    example = (ROOT / "examples" / "write_your_own_task.py").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "write_your_own_task.md").read_text(encoding="utf-8")
+    assert f"```python\n{example}```" in page
+
+
+def test_streams_are_uniform_and_independent() -> None:
+    streams = RandomStreams(1000)
+    streams.seed(0)
+    draws = streams.uniform(slice(None), -1.0, 3.0, 101)
+    assert draws.dtype == np.float32 and draws.min() >= -1.0 and draws.max() <= 3.0
+    assert abs(draws.mean() - 1.0) < 0.02 and abs(draws.var() - 16 / 12) < 0.02
+    for one, next_one in ((draws[:-1], draws[1:]), (draws[:, :-1], draws[:, 1:])):
+        assert abs(np.corrcoef(one.ravel(), next_one.ravel())[0, 1]) < 0.02
+    normal = streams.normal(slice(None), 2.0, 50)
+    assert abs(normal.mean()) < 0.05 and abs(normal.std() - 2.0) < 0.05
+    dice = streams.integers(slice(None), 1, 7, 60)
+    assert np.abs(np.bincount(dice.ravel(), minlength=7)[1:] / dice.size - 1 / 6).max() < 0.01
+    assert streams.uniform(np.array([3, 5]), 0.0, 1.0).shape == (2,)
+
+
+def test_huge_seeds_are_different_seeds() -> None:
+    def first(seed: int) -> float:
+        streams = RandomStreams(1)
+        streams.seed(seed)
+        return float(streams.uniform(slice(None), 0.0, 1.0)[0])
+
+    assert len({first(seed) for seed in (0, 1, 2**64, 2**64 + 1, 2**128, 2**200 + 1)}) == 6
