@@ -44,7 +44,7 @@ struct Pack {
   Vector v;
   Pack() = default;
   STICKSLIP_INLINE Pack(Vector x) : v(x) {}
-  STICKSLIP_INLINE explicit Pack(T x) : v(Vector{} + x) {}
+  STICKSLIP_INLINE explicit Pack(T x) : v(x - Vector{}) {}  // x - 0 is x, so no operation
   friend STICKSLIP_INLINE Pack operator+(Pack a, Pack b) { return a.v + b.v; }
   friend STICKSLIP_INLINE Pack operator-(Pack a, Pack b) { return a.v - b.v; }
   friend STICKSLIP_INLINE Pack operator*(Pack a, Pack b) { return a.v * b.v; }
