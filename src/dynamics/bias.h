@@ -12,25 +12,9 @@ namespace stickslip::dynamics::inline STICKSLIP_KERNELS {
 template <class S>
 void compute_bias(Tree<S>& t, const Vec3<S>& angular_velocity, const S* rates,
                   const Vec3<S>& gravity) {
-  using W = Wide<S>;
-  t.base.velocity = {angular_velocity, zero3<S>()};
-  t.base.acceleration = {zero3<S>(), -gravity};
-  const Spatial<S> base_momentum = t.base.inertia * t.base.velocity;
-  t.base.force = -cross_force(t.base.velocity, base_momentum, t.base.inertia * t.base.acceleration);
-  for (int ib = 0; ib < t.num_bundles; ++ib) {
-    const Bundle& b = t.bundles[ib];
-    Spatial<W> v = from_parents<S, Spatial>(t, b, t.base.velocity, &LinkState<W>::velocity);
-    Spatial<W> a = from_parents<S, Spatial>(t, b, t.base.acceleration, &LinkState<W>::acceleration);
-    for (int slot = b.first_slot; slot < b.first_slot + b.length; ++slot) {
-      LinkState<W>& link = t.links[slot];
-      const Spatial<W> joint = link.axis * load_lanes(rates, t.slots[slot].joint);
-      v = v + joint;
-      a = a + cross_motion(v, joint);
-      link.velocity = v;
-      link.acceleration = a;
-      link.force = -cross_force(v, link.inertia * v, link.inertia * a);
-    }
-  }
+  WalkInput<S> in;
+  in.angular_velocity = angular_velocity, in.rates = rates, in.gravity = gravity;
+  walk<kBias>(t, in);
 }
 
 /// Generalized forces of the link forces, summed toward the base: joints into `out` (num_joints),
@@ -38,14 +22,14 @@ void compute_bias(Tree<S>& t, const Vec3<S>& angular_velocity, const S* rates,
 template <class S>
 void collect_joint_forces(Tree<S>& t, S* out) {
   using W = Wide<S>;
-  for (int slot = 0; slot < t.num_slots; ++slot)
-    if (t.slots[slot].has_children) t.links[slot].force_from_children = {};
+  clear_sums<kSolveTransposed>(t);
   for (int ib = t.num_bundles - 1; ib >= 0; --ib) {
     const Bundle& b = t.bundles[ib];
     Spatial<W> f = zero_spatial<W>();
-    for (int slot = b.first_slot + b.length - 1; slot >= b.first_slot; --slot) {
+    const int last = b.first_slot + b.length - 1;
+    for (int slot = last; slot >= b.first_slot; --slot) {
       f = f + t.links[slot].force;
-      if (t.slots[slot].has_children) f = f + t.links[slot].force_from_children;
+      if (slot == last && b.has_children) f = f + t.links[slot].force_from_children;
       store_lanes<S>(dot(f, t.links[slot].axis), out, t.slots[slot].joint, b.lanes);
     }
     add_to_parents<S, Spatial>(t, b, f, t.base.force, &LinkState<W>::force_from_children);

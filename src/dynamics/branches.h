@@ -28,15 +28,23 @@ struct Bundle {
   int first_slot;
   int length;                   // joints per chain
   int lanes;                    // chains in use; the rest repeat chain 0
+  bool has_children;            // other bundles hang on its last slot
   LinkIndex parent[kMaxLanes];  // of each chain's first joint
   bool on_base;                 // all parents are body 0
 };
 
 struct Slot {
   bool prismatic;
-  bool has_children;     // other bundles hang on it
   int joint[kMaxLanes];  // joint index of each lane
   LinkIndex parent[kMaxLanes];
+};
+
+/// Mass properties of one link in its turned frame.
+template <class K>
+struct LinkInertia {
+  K mass;        // [kg]
+  K com[3];      // [m]
+  K inertia[6];  // xx xy xz yy yz zz about the center of mass [kg m^2]
 };
 
 /// Constants of one link, axes turned. K is a pack of branches or one number for all environments.
@@ -44,9 +52,7 @@ template <class K>
 struct LinkConstants {
   K rotation[9];  // parent link frame <- this link's frame at q = 0
   K position[3];  // of the joint in the parent link's frame [m]
-  K mass;         // [kg]
-  K com[3];       // [m]
-  K inertia[6];   // about the center of mass [kg m^2]
+  LinkInertia<K> inertial;
 };
 
 }  // namespace stickslip::dynamics

@@ -14,11 +14,8 @@ void compute_mass_matrix(const Tree<S>& t, RigidInertia<Wide<S>>* composites, S*
   for (int slot = 0; slot < t.num_slots; ++slot) composites[slot] = t.links[slot].inertia;
   const auto put = [&](int i, int j, S value) { out[i * n + j] = out[j * n + i] = value; };
   const auto composite_of = [&](LinkIndex link) {
-    RigidInertia<S> c;
-    for (int k = 0; k < kNumbersIn<S, RigidInertia>; ++k)
-      reinterpret_cast<S*>(&c)[k] =
-          lane_of<S>(reinterpret_cast<const Wide<S>*>(&composites[link.slot])[k], link.lane);
-    return c;
+    const auto* from = reinterpret_cast<const Wide<S>*>(&composites[link.slot]);
+    return Numbers<S, RigidInertia>::make([&](int k) { return lane_of<S>(from[k], link.lane); });
   };
   for (int ib = t.num_bundles - 1; ib >= 0; --ib)
     for (int slot = t.bundles[ib].first_slot + t.bundles[ib].length - 1;
@@ -38,7 +35,7 @@ void compute_mass_matrix(const Tree<S>& t, RigidInertia<Wide<S>>* composites, S*
         }
         const LinkIndex parent = t.slots[slot].parent[lane];
         if (parent.slot == kBaseSlot) continue;
-        for (int k = 0; k < kNumbersIn<S, RigidInertia>; ++k) {
+        for (int k = 0; k < kNumbersIn<RigidInertia>; ++k) {
           auto& to = reinterpret_cast<Wide<S>*>(&composites[parent.slot])[k];
           if constexpr (BundleScalar<S>::kLanes == 1)
             to = to + reinterpret_cast<const S*>(&inertia)[k];

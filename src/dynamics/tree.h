@@ -2,7 +2,7 @@
 #pragma once
 #include "dynamics/branches.h"
 #include "lane/row3.h"
-#include "spatial/spatial.h"
+#include "spatial/numbers.h"
 
 namespace stickslip::dynamics::inline STICKSLIP_KERNELS {
 
@@ -14,9 +14,9 @@ struct LinkState {
   Vec3<W> position;  // of the link frame's origin [m]
   Spatial<W> axis;   // joint motion s: link velocity = parent's + s * rate
   RigidInertia<W> inertia;
-  Spatial<W> velocity;  // relative to the translation of the base origin
-  Spatial<W> acceleration;
-  Spatial<W> force;  // applied to the link
+  Spatial<W> velocity;      // relative to the translation of the base origin
+  Spatial<W> acceleration;  // of the last link of a chain that others hang on
+  Spatial<W> force;         // applied to the link
   Spatial<W> arm;    // U = I_A s / sqrt(D): row of the factor L, as a force at the base origin
   W root, inv_root;  // sqrt(D), 1 / sqrt(D), D = s . I_A s: diagonal of L
   W x;               // coordinate of this joint in L-space, x = L^-T (generalized force)
@@ -52,6 +52,8 @@ struct Tree {
   const Slot* slots;
   const LinkConstants<K>* constants;
   LinkState<W>* links;
+  const LinkInertia<W>*
+      inertias;  // per slot, each environment its own; null: those of the constants
   S base_mass, base_com[3], base_inertia[6];
   BaseState<S> base;
 };
@@ -95,41 +97,36 @@ STICKSLIP_INLINE void put_lane(Wide<S>& w, int lane, S value) {
     set_lane(w, lane, value);
 }
 
-template <class S, template <class> class X>
-inline constexpr int kNumbersIn = sizeof(X<S>) / sizeof(S);
-
 /// A field of one link.
 template <class S, template <class> class X>
 STICKSLIP_INLINE X<S> field_of(const Tree<S>& t, LinkIndex link,
                                X<Wide<S>> LinkState<Wide<S>>::* field) {
-  X<S> out;
   const auto* from = reinterpret_cast<const Wide<S>*>(&(t.links[link.slot].*field));
-  for (int k = 0; k < kNumbersIn<S, X>; ++k)
-    reinterpret_cast<S*>(&out)[k] = lane_of<S>(from[k], link.lane);
-  return out;
+  return Numbers<S, X>::make([&](int k)
+                                 STICKSLIP_LAMBDA { return lane_of<S>(from[k], link.lane); });
 }
 
 /// A field of the parents of a bundle's chains: `base` where they hang on body 0.
 template <class S, template <class> class X>
 STICKSLIP_INLINE X<Wide<S>> from_parents(const Tree<S>& t, const Bundle& b, const X<S>& base,
                                          X<Wide<S>> LinkState<Wide<S>>::* field) {
-  X<Wide<S>> out;
-  auto* to = reinterpret_cast<Wide<S>*>(&out);
+  using W = Wide<S>;
   if (b.on_base) {
-    for (int k = 0; k < kNumbersIn<S, X>; ++k)
-      to[k] = Wide<S>(reinterpret_cast<const S*>(&base)[k]);
-  } else if constexpr (BundleScalar<S>::kLanes == 1) {
-    out = t.links[b.parent[0].slot].*field;
-  } else {
-    const Wide<S>* from[kMaxLanes];
-    for (int lane = 0; lane < kMaxLanes; ++lane)
-      from[lane] = reinterpret_cast<const Wide<S>*>(&(t.links[b.parent[lane].slot].*field));
-    for (int k = 0; k < kNumbersIn<S, X>; ++k)
-      to[k] = typename Wide<S>::Vector{
-          get_lane(from[0][k], b.parent[0].lane), get_lane(from[1][k], b.parent[1].lane),
-          get_lane(from[2][k], b.parent[2].lane), get_lane(from[3][k], b.parent[3].lane)};
+    const S* from = reinterpret_cast<const S*>(&base);
+    return Numbers<W, X>::make([&](int k) STICKSLIP_LAMBDA { return W(from[k]); });
   }
-  return out;
+  if constexpr (BundleScalar<S>::kLanes == 1) {
+    return t.links[b.parent[0].slot].*field;
+  } else {
+    const S* from[kMaxLanes];
+    for (int lane = 0; lane < kMaxLanes; ++lane)
+      from[lane] =
+          reinterpret_cast<const S*>(&(t.links[b.parent[lane].slot].*field)) + b.parent[lane].lane;
+    return Numbers<W, X>::make([&](int k) STICKSLIP_LAMBDA {
+      k *= kMaxLanes;
+      return W(typename W::Vector{from[0][k], from[1][k], from[2][k], from[3][k]});
+    });
+  }
 }
 
 /// Adds what each chain of a bundle hands to its parent. Last chain first, as the bundles
@@ -138,25 +135,43 @@ STICKSLIP_INLINE X<Wide<S>> from_parents(const Tree<S>& t, const Bundle& b, cons
 template <class S, template <class> class X>
 STICKSLIP_INLINE void add_to_parents(Tree<S>& t, const Bundle& b, const X<Wide<S>>& given,
                                      X<S>& base, X<Wide<S>> LinkState<Wide<S>>::* field) {
-  const auto* from = reinterpret_cast<const Wide<S>*>(&given);
+  using W = Wide<S>;
   if (b.on_base) {
     S* to = reinterpret_cast<S*>(&base);
-    for (int k = 0; k < kNumbersIn<S, X>; ++k)
-      for (int lane = b.lanes - 1; lane >= 0; --lane) to[k] = to[k] + lane_of<S>(from[k], lane);
+    Numbers<W, X>::visit(given, [&](int k, const W& x) STICKSLIP_LAMBDA {
+      for (int lane = b.lanes - 1; lane >= 0; --lane) to[k] = to[k] + lane_of<S>(x, lane);
+    });
   } else {
     for (int lane = b.lanes - 1; lane >= 0; --lane) {
-      auto* to = reinterpret_cast<Wide<S>*>(&(t.links[b.parent[lane].slot].*field));
-      for (int k = 0; k < kNumbersIn<S, X>; ++k) {
+      auto* to = reinterpret_cast<W*>(&(t.links[b.parent[lane].slot].*field));
+      Numbers<W, X>::visit(given, [&](int k, const W& x) STICKSLIP_LAMBDA {
         if constexpr (BundleScalar<S>::kLanes == 1)
-          to[k] = to[k] + from[k];
+          to[k] = to[k] + x;
         else
           set_lane(to[k], b.parent[lane].lane,
-                   get_lane(to[k], b.parent[lane].lane) + get_lane(from[k], lane));
-      }
+                   get_lane(to[k], b.parent[lane].lane) + get_lane(x, lane));
+      });
     }
   }
 }
 
+/// Adds the lanes of a bundle to `sum`, one by one.
+template <class S>
+STICKSLIP_INLINE S add_lanes(const Wide<S>& part, int lanes, S sum) {
+  for (int lane = 0; lane < lanes; ++lane) sum = sum + lane_of<S>(part, lane);
+  return sum;
+}
+template <class S, template <class> class X>
+STICKSLIP_INLINE void add_lanes(const X<Wide<S>>& part, int lanes, X<S>& total) {
+  S* to = reinterpret_cast<S*>(&total);
+  Numbers<Wide<S>, X>::visit(part, [&](int k, const Wide<S>& x)
+                                       STICKSLIP_LAMBDA { to[k] = add_lanes<S>(x, lanes, to[k]); });
+}
+
+template <class W, class S>
+STICKSLIP_INLINE Vec3<W> wide(const Vec3<S>& v) {
+  return {W(v.x), W(v.y), W(v.z)};
+}
 template <class W, class K>
 STICKSLIP_INLINE Vec3<W> wide3(const K v[3]) {
   return {W(v[0]), W(v[1]), W(v[2])};

@@ -94,7 +94,9 @@ TreeLayout::TreeLayout(const Model& model, int lanes_per_bundle)
         b.parent[lane] = link_of_body[parent];
         if (parent != 0) {
           b.on_base = false;
-          slots[b.parent[lane].slot].has_children = true;
+          for (Bundle& above : bundles)  // a chain ends where others hang on it
+            if (above.first_slot + above.length - 1 == b.parent[lane].slot)
+              above.has_children = true;
         }
       }
       num_slots += b.length;
@@ -111,21 +113,22 @@ TreeLayout::TreeLayout(const Model& model, int lanes_per_bundle)
       const Matrix3 from_parent = transpose(turn[joint.parent_body]);
       const Matrix3 r = multiply(multiply(from_parent, joint.pose.rotation), turn[j + 1]);
       const Vector3 p = rotate(from_parent, joint.pose.position);
-      const Vector3 c = turned(j + 1, in.center_of_mass);
-      const auto& i = in.inertia;
-      const Matrix3 full{i[0], i[1], i[2], i[1], i[3], i[4], i[2], i[4], i[5]};
-      const Matrix3 t = multiply(multiply(transpose(turn[j + 1]), full), turn[j + 1]);
       std::copy(r.begin(), r.end(), link.rotation);
       std::copy(p.begin(), p.end(), link.position);
-      link.mass = in.mass;
-      std::copy(c.begin(), c.end(), link.com);
-      const double packed[6] = {t[0], t[1], t[2], t[4], t[5], t[8]};
-      std::copy(packed, packed + 6, link.inertia);
+      link.inertial = turned_inertia(j + 1, in);
     }
 }
 
 Vector3 TreeLayout::turned(int body, const Vector3& p) const {
   return rotate(transpose(turn[body]), p);
+}
+
+LinkInertia<double> TreeLayout::turned_inertia(int body, const Inertial& in) const {
+  const Vector3 c = turned(body, in.center_of_mass);
+  const auto& i = in.inertia;
+  const Matrix3 full{i[0], i[1], i[2], i[1], i[3], i[4], i[2], i[4], i[5]};
+  const Matrix3 t = multiply(multiply(transpose(turn[body]), full), turn[body]);
+  return {in.mass, {c[0], c[1], c[2]}, {t[0], t[1], t[2], t[4], t[5], t[8]}};
 }
 
 }  // namespace stickslip::dynamics

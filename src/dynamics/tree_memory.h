@@ -23,6 +23,7 @@ class TreeMemory {
     tree_.slots = layout_.slots.data();
     tree_.constants = constants_.data();
     tree_.links = links_.data();
+    tree_.inertias = nullptr;
     tree_.base = {};
     tree_.base_mass = constant<S>(layout_.base.mass);
     for (int k = 0; k < 3; ++k) tree_.base_com[k] = constant<S>(layout_.base.center_of_mass[k]);

@@ -122,11 +122,11 @@ STICKSLIP_INLINE ArticulatedInertia<S> operator+(const ArticulatedInertia<S>& a,
 template <class S>
 STICKSLIP_INLINE ArticulatedInertia<S> operator+(const ArticulatedInertia<S>& a,
                                                  const ArticulatedInertia<S>& b) {
-  ArticulatedInertia<S> r;
-  r.aa = a.aa + b.aa;
-  for (int i = 0; i < 9; ++i) r.al.m[i] = a.al.m[i] + b.al.m[i];
-  r.ll = a.ll + b.ll;
-  return r;
+  const S *x = a.al.m, *y = b.al.m;  // written out, so that the values stay in registers
+  return {a.aa + b.aa,
+          {{x[0] + y[0], x[1] + y[1], x[2] + y[2], x[3] + y[3], x[4] + y[4], x[5] + y[5],
+            x[6] + y[6], x[7] + y[7], x[8] + y[8]}},
+          a.ll + b.ll};
 }
 template <class S>
 STICKSLIP_INLINE Spatial<S> operator*(const ArticulatedInertia<S>& a, const Spatial<S>& v) {

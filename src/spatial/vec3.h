@@ -91,12 +91,16 @@ STICKSLIP_INLINE Vec3<S> transposed_madd(const Mat3<S>& a, const Vec3<S>& b, con
 }
 template <class S>
 STICKSLIP_INLINE Mat3<S> operator*(const Mat3<S>& a, const Mat3<S>& b) {
-  Mat3<S> r;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      r.m[3 * i + j] =
-          madd(a.m[3 * i + 2], b.m[6 + j], madd(a.m[3 * i + 1], b.m[3 + j], a.m[3 * i] * b.m[j]));
-  return r;
+  const S *x = a.m, *y = b.m;  // written out, so that the values stay in registers
+  return {{madd(x[2], y[6], madd(x[1], y[3], x[0] * y[0])),
+           madd(x[2], y[7], madd(x[1], y[4], x[0] * y[1])),
+           madd(x[2], y[8], madd(x[1], y[5], x[0] * y[2])),
+           madd(x[5], y[6], madd(x[4], y[3], x[3] * y[0])),
+           madd(x[5], y[7], madd(x[4], y[4], x[3] * y[1])),
+           madd(x[5], y[8], madd(x[4], y[5], x[3] * y[2])),
+           madd(x[8], y[6], madd(x[7], y[3], x[6] * y[0])),
+           madd(x[8], y[7], madd(x[7], y[4], x[6] * y[1])),
+           madd(x[8], y[8], madd(x[7], y[5], x[6] * y[2]))}};
 }
 
 /// Symmetric: xx xy xz yy yz zz.
@@ -126,11 +130,13 @@ STICKSLIP_INLINE Vec3<S> madd(const Sym3<S>& a, const Vec3<S>& b, const Vec3<S>&
 template <class S>
 STICKSLIP_INLINE Sym3<S> rotate(const Mat3<S>& r, const Sym3<S>& a) {
   const Mat3<S> t = r * Mat3<S>{{a.xx, a.xy, a.xz, a.xy, a.yy, a.yz, a.xz, a.yz, a.zz}};
-  const auto e = [&](int i, int j) {
-    return madd(t.m[3 * i + 2], r.m[3 * j + 2],
-                madd(t.m[3 * i + 1], r.m[3 * j + 1], t.m[3 * i] * r.m[3 * j]));
-  };
-  return {e(0, 0), e(0, 1), e(0, 2), e(1, 1), e(1, 2), e(2, 2)};
+  const S *x = t.m, *y = r.m;
+  return {madd(x[2], y[2], madd(x[1], y[1], x[0] * y[0])),
+          madd(x[2], y[5], madd(x[1], y[4], x[0] * y[3])),
+          madd(x[2], y[8], madd(x[1], y[7], x[0] * y[6])),
+          madd(x[5], y[5], madd(x[4], y[4], x[3] * y[3])),
+          madd(x[5], y[8], madd(x[4], y[7], x[3] * y[6])),
+          madd(x[8], y[8], madd(x[7], y[7], x[6] * y[6]))};
 }
 
 /// Rotation matrix of the unit quaternion w x y z.

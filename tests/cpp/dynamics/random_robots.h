@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <random>
+#include <vector>
 
 namespace stickslip::testing {
 
@@ -28,29 +29,53 @@ inline Inertial random_inertial(std::mt19937& rng) {
   return in;
 }
 
-/// A tree of `joints` joints: `legs` > 0 gives that many equal chains on the base (the last one
-/// longer), else a random tree.
-inline ModelPtr random_robot(unsigned seed, int joints, int legs, BaseType base) {
+/// A tree from a list of parents: joint j hangs on the link of joint parents[j], or on the base
+/// where that is -1. Some joints are prismatic if asked for.
+inline ModelPtr random_tree(unsigned seed, const std::vector<int>& parents, bool prismatic,
+                            BaseType base) {
   std::mt19937 rng(seed);
   std::uniform_real_distribution<double> u(-1, 1);
   ModelBuilder builder("random");
   builder.add_link("link0", random_inertial(rng));
-  for (int j = 0; j < joints; ++j) {
+  for (size_t j = 0; j < parents.size(); ++j) {
     const std::string id = std::to_string(100 + j);  // equal digits: alphabetical is numerical
     builder.add_link("link" + id, random_inertial(rng));
     LinkJoint joint;
     joint.name = "joint" + id;
     joint.child = "link" + id;
-    const int parent =
-        legs > 0 ? (j < legs ? -1 : j - legs) : static_cast<int>(rng() % (j + 1)) - 1;
-    joint.parent = parent < 0 ? "link0" : "link" + std::to_string(100 + parent);
-    joint.type = legs == 0 && rng() % 4 == 0 ? LinkJointType::kPrismatic : LinkJointType::kRevolute;
+    joint.parent = parents[j] < 0 ? "link0" : "link" + std::to_string(100 + parents[j]);
+    joint.type = prismatic && rng() % 4 == 0 ? LinkJointType::kPrismatic : LinkJointType::kRevolute;
     joint.pose.rotation = random_rotation(rng);
     for (double& p : joint.pose.position) p = 0.3 * u(rng);
     for (double& a : joint.axis) a = u(rng);
     builder.add_joint(joint);
   }
   return builder.build(base);
+}
+
+/// A tree of `joints` joints: `legs` > 0 gives that many equal chains on the base (the last one
+/// longer), else a random tree.
+inline ModelPtr random_robot(unsigned seed, int joints, int legs, BaseType base) {
+  std::mt19937 rng(seed + 1000);
+  std::vector<int> parents;
+  for (int j = 0; j < joints; ++j)
+    parents.push_back(legs > 0 ? (j < legs ? -1 : j - legs)
+                               : static_cast<int>(rng() % (j + 1)) - 1);
+  return random_tree(seed, parents, legs == 0, base);
+}
+
+/// A humanoid's topology: two legs of 6 joints, a trunk of 3, on it two arms of 7 and a head of 2.
+inline ModelPtr random_humanoid(unsigned seed) {
+  std::vector<int> parents;
+  const auto add_chain = [&](int on, int length) {
+    for (int k = 0; k < length; ++k)
+      parents.push_back(k == 0 ? on : static_cast<int>(parents.size()) - 1);
+    return static_cast<int>(parents.size()) - 1;
+  };
+  add_chain(-1, 6), add_chain(-1, 6);
+  const int chest = add_chain(-1, 3);
+  add_chain(chest, 7), add_chain(chest, 7), add_chain(chest, 2);
+  return random_tree(seed, parents, false, BaseType::kFloating);
 }
 
 }  // namespace stickslip::testing

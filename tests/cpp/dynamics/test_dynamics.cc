@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "check.h"
-#include "dynamics/bias.h"
 #include "dynamics/contact_rows.h"
+#include "dynamics/dynamics.h"
 #include "dynamics/mass_matrix.h"
 #include "dynamics/random_robots.h"
 #include "dynamics/tree_memory.h"
@@ -15,43 +15,58 @@ using namespace stickslip::dynamics;
 
 namespace {
 
+/// Robots of one model in one random state per lane of S.
+template <class S>
+struct Robots {
+  TreeMemory<S> memory;
+  Tree<S>& t;
+  std::vector<S> q, rates, extra, joints;
+  S quaternion[4], base[6] = {};
+  Vec3<S> w, gravity;
+
+  /// states: one environment per lane of S; entries: quaternion (4), angular velocity (3), q, rates
+  Robots(const Model& model, const std::vector<std::vector<double>>& states)
+      : memory(model), t(memory.tree()), gravity{S(0), S(0), constant<S>(-9.81)} {
+    const int n = model.num_joints();
+    q.resize(n), rates.resize(n), extra.resize(n), joints.resize(n);
+    const auto load = [&](S& to, int k) {
+      for (int lane = 0; lane < ScalarTraits<S>::kWidth; ++lane)
+        set_lane(to, lane, static_cast<Value<S>>(states[lane][k]));
+    };
+    for (int k = 0; k < 4; ++k) load(quaternion[k], k);
+    load(w.x, 4), load(w.y, 5), load(w.z, 6);
+    for (int j = 0; j < n; ++j)
+      load(q[j], 7 + j), load(rates[j], 7 + n + j), extra[j] = constant<S>(0.01);
+  }
+
+  WalkInput<S> input() const {
+    return {quaternion, q.data(), w, w, rates.data(), gravity, extra.data(), rates.data(), &push};
+  }
+  const Spatial<S> push{{S(1), S(2), S(3)}, {S(4), S(5), S(6)}};  // on the base
+};
+
 /// What the kernels make of one random state, for any scalar: everything a step uses, in one list.
 template <class S>
 std::vector<S> run_kernels(const Model& model, const std::vector<std::vector<double>>& states) {
-  // states: one environment per lane of S; entries: quaternion (4), angular velocity (3), q, rates
-  TreeMemory<S> memory(model);
-  Tree<S>& t = memory.tree();
-  const int n = model.num_joints();
-  std::vector<S> q(n), rates(n), extra(n), joints(n);
-  S quaternion[4];
-  Vec3<S> w;
-  const auto load = [&](S& to, int k) {
-    for (int lane = 0; lane < ScalarTraits<S>::kWidth; ++lane)
-      set_lane(to, lane, static_cast<Value<S>>(states[lane][k]));
-  };
-  for (int k = 0; k < 4; ++k) load(quaternion[k], k);
-  load(w.x, 4), load(w.y, 5), load(w.z, 6);
-  for (int j = 0; j < n; ++j)
-    load(q[j], 7 + j), load(rates[j], 7 + n + j), extra[j] = constant<S>(0.01);
-  const Vec3<S> gravity{constant<S>(0), constant<S>(0), constant<S>(-9.81)};
-
+  Robots<S> r(model, states);
+  Tree<S>& t = r.t;
+  TreeMemory<S>& memory = r.memory;
   std::vector<S> out;
-  compute_positions(t, quaternion, q.data());
+  compute_positions(t, r.quaternion, r.q.data());
   compute_inertias(t);
-  factor_mass_matrix(t, extra.data());
-  compute_bias(t, w, rates.data(), gravity);
-  solve_lower_transposed(t, rates.data(), LinkForces::kAll);
-  S base[6];
-  solve_lower(t, base, joints.data());
-  out.insert(out.end(), base, base + 6);
-  out.insert(out.end(), joints.begin(), joints.end());
-  compute_velocities(t, w, rates.data());
-  multiply_lower(t, w, rates.data());
+  factor_mass_matrix(t, r.extra.data());
+  compute_bias(t, r.w, r.rates.data(), r.gravity);
+  solve_lower_transposed(t, r.rates.data(), LinkForces::kAll);
+  out.push_back(solve_lower(t, r.base, r.joints.data()));
+  out.insert(out.end(), r.base, r.base + 6);
+  out.insert(out.end(), r.joints.begin(), r.joints.end());
+  compute_velocities(t, r.w, r.rates.data());
+  multiply_lower(t, r.w, r.rates.data());
   out.push_back(squared_norm(t));
   const Spatial<S> p = base_momentum(t);
   out.insert(out.end(), {p.ang.x, p.ang.y, p.ang.z, p.lin.x, p.lin.y, p.lin.z});
-  std::vector<LinkIndex> path(memory.max_depth() + 1);
-  std::vector<Row3<S>> rows(memory.max_depth() + 1);
+  std::vector<LinkIndex> path(model.num_joints());
+  std::vector<Row3<S>> rows(model.num_joints());
   for (const LinkIndex& link : memory.layout().link_of_body) {
     ContactRows<S> r{0, path.data(), rows.data(), {}};
     const S half = constant<S>(0.5), o = constant<S>(0);
@@ -82,10 +97,106 @@ std::vector<double> random_state(const Model& model, unsigned seed) {
 
 std::vector<ModelPtr> robots() {
   using testing::random_robot;
-  return {random_robot(1, 12, 4, BaseType::kFloating), random_robot(2, 13, 4, BaseType::kFloating),
-          random_robot(3, 15, 0, BaseType::kFloating), random_robot(4, 7, 1, BaseType::kFixed),
-          random_robot(5, 20, 0, BaseType::kFixed),    random_robot(6, 30, 0, BaseType::kFloating),
-          random_robot(7, 1, 1, BaseType::kFixed),     random_robot(8, 18, 6, BaseType::kFloating)};
+  return {random_robot(1, 12, 4, BaseType::kFloating),
+          random_robot(2, 13, 4, BaseType::kFloating),
+          random_robot(3, 15, 0, BaseType::kFloating),
+          random_robot(4, 7, 1, BaseType::kFixed),
+          random_robot(5, 20, 0, BaseType::kFixed),
+          random_robot(6, 30, 0, BaseType::kFloating),
+          random_robot(7, 1, 1, BaseType::kFixed),
+          random_robot(8, 18, 6, BaseType::kFloating),
+          testing::random_humanoid(9)};
+}
+
+/// All numbers that passes leave in a tree and its links.
+template <class S>
+std::vector<Value<S>> numbers(Robots<S>& r, bool with_composite) {
+  if (!with_composite) r.t.base.composite = {};
+  std::vector<Value<S>> out;
+  const auto add = [&](const auto& x) {
+    const auto* from = reinterpret_cast<const Value<S>*>(&x);
+    out.insert(out.end(), from, from + sizeof(x) / sizeof(Value<S>));
+  };
+  for (const S& x : r.joints) add(x);
+  add(r.base), add(r.t.base);
+  for (int slot = 0; slot < r.t.num_slots; ++slot) add(r.t.links[slot]);
+  return out;
+}
+
+/// Fused passes against the passes alone.
+template <class S>
+void compare_fused() {
+  for (const ModelPtr& model : robots()) {
+    std::vector<std::vector<double>> states;
+    for (int lane = 0; lane < ScalarTraits<S>::kWidth; ++lane)
+      states.push_back(random_state(*model, 20 + lane));
+    Robots<S> alone(*model, states), fused(*model, states);
+    Tree<S>&a = alone.t, &f = fused.t;
+    const WalkInput<S> in = fused.input();
+
+    compute_positions(a, in.quaternion, in.joints);
+    compute_inertias(a);
+    compute_bias(a, in.angular_velocity, in.rates, in.gravity);
+    factor_mass_matrix(a, in.diagonal);
+    a.base.force = a.base.force + *in.base_force;
+    solve_lower_transposed(a, in.tau, LinkForces::kAll);
+    a.base.force = {}, f.base.force = {};
+    compute_free_motion(f, in);
+    f.base.force = {};
+    CHECK(numbers(alone, false) == numbers(fused, false));
+
+    compute_positions_and_inertias(f, in.quaternion, in.joints);
+    compute_inertias(a);
+    compute_velocities(a, in.angular_velocity, in.rates);
+    multiply_lower(a, in.linear_velocity, in.rates);
+    multiply_lower(f, in.angular_velocity, in.linear_velocity, in.rates);
+    CHECK(numbers(alone, true) == numbers(fused, true));
+
+    compute_bias(a, in.angular_velocity, in.joints, in.gravity);
+    solve_lower_transposed<S>(a, nullptr, LinkForces::kAll);
+    solve_bias(f, in.angular_velocity, in.joints, in.gravity);
+    CHECK(numbers(alone, true) == numbers(fused, true));
+
+    compute_inertias(a);
+    factor_mass_matrix(a, in.diagonal);
+    compute_bias(a, in.angular_velocity, in.rates, in.gravity);
+    solve_lower_transposed<S>(a, nullptr, LinkForces::kAll);
+    factor_and_solve_bias(f, in.diagonal, in.angular_velocity, in.rates, in.gravity);
+    const S norm = squared_norm(a), same = solve_lower(f, fused.base, fused.joints.data());
+    solve_lower(a, alone.base, alone.joints.data());
+    CHECK(numbers(alone, true) == numbers(fused, true));
+    for (int lane = 0; lane < ScalarTraits<S>::kWidth; ++lane)
+      CHECK(get_lane(norm, lane) == get_lane(same, lane));
+  }
+}
+
+/// A robot whose links' inertias come from the environment, against a model that has them.
+template <class S>
+void compare_inertias() {
+  using testing::random_robot;
+  for (const int legs : {0, 4}) {
+    const ModelPtr wanted = random_robot(1, 13, legs, BaseType::kFloating);
+    const std::vector<std::vector<double>> states(ScalarTraits<S>::kWidth,
+                                                  random_state(*wanted, 30));
+    Robots<S> expected(*wanted, states), given(*wanted, states);
+    // Constants of another robot, overridden.
+    std::vector<LinkConstants<WideConstant<S>>> wrong(given.t.constants,
+                                                      given.t.constants + given.t.num_slots);
+    for (auto& c : wrong) c.inertial = {};
+    given.t.constants = wrong.data();
+    std::vector<LinkInertia<Wide<S>>> inertias(given.t.num_slots);
+    const TreeLayout& layout = given.memory.layout();
+    for (int slot = 0; slot < given.t.num_slots; ++slot)
+      for (int lane = 0; lane < ScalarTraits<Wide<S>>::kWidth; ++lane) {
+        const int body = layout.slots[slot].joint[Tree<S>::kLanes == 1 ? 0 : lane] + 1;
+        set_inertia(inertias[slot], lane,
+                    layout.turned_inertia(body, wanted->bodies()[body].inertial));
+      }
+    given.t.inertias = inertias.data();
+    compute_free_motion(expected.t, expected.input());
+    compute_free_motion(given.t, given.input());
+    CHECK(numbers(expected, true) == numbers(given, true));
+  }
 }
 
 template <class Pack>
@@ -116,6 +227,21 @@ TEST(DoublePacksEqualDoubleBitForBit) {
 TEST(FloatPacksEqualFloatBitForBit) {
   compare_lanes_with_double<Pack<float, 8>>();
   compare_lanes_with_double<Pack<float, 16>>();
+}
+
+TEST(FusedPassesEqualSeparateOnesBitForBit) {
+  compare_fused<double>();
+  compare_fused<float>();
+  compare_fused<Pack<double, 4>>();
+  compare_fused<Pack<double, 8>>();
+  compare_fused<Pack<float, 8>>();
+  compare_fused<Pack<float, 16>>();
+}
+
+TEST(InertiasPerEnvironmentEqualThoseOfAModelThatHasThem) {
+  compare_inertias<double>();
+  compare_inertias<Pack<double, 8>>();
+  compare_inertias<Pack<float, 16>>();
 }
 
 TEST(FloatEqualsDoubleToFloatPrecision) {

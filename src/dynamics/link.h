@@ -1,0 +1,83 @@
+// What the passes over the tree compute at one link: each formula of docs/theory/dynamics.md once,
+// for every pass that needs it. What a chain hands from link to link stays in registers.
+#pragma once
+#include "dynamics/tree.h"
+#include "lane/math.h"
+
+namespace stickslip::dynamics::inline STICKSLIP_KERNELS {
+
+/// (D3): the pose of the parent becomes that of the link. Returns the joint's motion s (D4).
+template <class W, class K>
+STICKSLIP_INLINE Spatial<W> move_to_link(const LinkConstants<K>& c, bool prismatic, W q, Mat3<W>& r,
+                                         Vec3<W>& p) {
+  p = madd(r, wide3<W>(c.position), p);
+  r = r * wide_mat3<W>(c.rotation);
+  const Vec3<W> axis{r.m[2], r.m[5], r.m[8]};
+  if (prismatic) {
+    p = madd(axis, q, p);
+    return {zero3<W>(), axis};
+  }
+  W sine, cosine;
+  sincos(q, sine, cosine);
+  // The link frame is turned so that the axis is z.
+  const Vec3<W> x{r.m[0], r.m[3], r.m[6]}, y{r.m[1], r.m[4], r.m[7]};
+  const Vec3<W> x_turned = madd(y, sine, x * cosine), y_turned = nmadd(x, sine, y * cosine);
+  r = {{x_turned.x, y_turned.x, axis.x, x_turned.y, y_turned.y, axis.y, x_turned.z, y_turned.z,
+        axis.z}};
+  return {axis, cross(p, axis)};
+}
+
+/// (D5) at pose (r, p), from constants of the model or of each environment.
+template <class W, class K>
+STICKSLIP_INLINE RigidInertia<W> inertia_at(const LinkInertia<K>& c, const Mat3<W>& r,
+                                            const Vec3<W>& p) {
+  return inertia_at_reference(W(c.mass), madd(r, wide3<W>(c.com), p),
+                              rotate(r, wide_sym3<W>(c.inertia)));
+}
+
+/// (D4), (D6): velocity and acceleration of the parent become those of the link. Returns minus the
+/// inertial force.
+template <class W>
+STICKSLIP_INLINE Spatial<W> bias_of_link(const RigidInertia<W>& inertia, const Spatial<W>& axis,
+                                         W rate, Spatial<W>& v, Spatial<W>& a) {
+  const Spatial<W> joint = axis * rate;
+  v = v + joint;
+  a = a + cross_motion(v, joint);
+  return -cross_force(v, inertia * v, inertia * a);
+}
+
+/// (D13): this joint's coordinate of y = L u; `v` is the parent's velocity.
+template <class W>
+STICKSLIP_INLINE W multiply_at_link(const LinkState<W>& link, const Spatial<W>& v,
+                                    const Vec3<W>& translation, W rate) {
+  const W from_parent = dot(link.arm.ang, v.ang) + dot(link.arm.lin, v.lin + translation);
+  return madd(link.root, rate, from_parent);
+}
+
+/// (D8): row of L of the joint, from the articulated inertia of its link. Returns what is left for
+/// the parent (D7).
+template <class W>
+STICKSLIP_INLINE ArticulatedInertia<W> factor_at_link(const ArticulatedInertia<W>& i,
+                                                      const Spatial<W>& axis, const W* extra,
+                                                      LinkState<W>& link) {
+  const Spatial<W> u = i * axis;
+  W d = dot(u, axis);
+  if (extra) d = d + *extra;
+  const W inverse = constant<W>(1) / d;
+  link.root = sqrt(d);
+  link.inv_root = link.root * inverse;
+  link.arm = u * link.inv_root;
+  return without(i, u, u * inverse);
+}
+
+/// (D11): x of the joint from the force on its link. Returns what is passed on.
+template <class W>
+STICKSLIP_INLINE Spatial<W> solve_at_link(const Spatial<W>& f, const Spatial<W>& axis, const W* tau,
+                                          LinkState<W>& link) {
+  W on_joint = dot(f, axis);
+  if (tau) on_joint = on_joint + *tau;
+  link.x = on_joint * link.inv_root;
+  return nmadd(link.arm, link.x, f);
+}
+
+}  // namespace stickslip::dynamics::inline STICKSLIP_KERNELS
