@@ -68,8 +68,8 @@ STICKSLIP_INLINE S nmadd(S a, S b, S c) {  // c - a * b, fused
   return madd(-a, b, c);
 }
 template <class S>
-STICKSLIP_INLINE S abs(S a) {
-  return select(a < S(Value<S>(0)), -a, a);
+STICKSLIP_INLINE S abs(S a) {  // clears the sign, also of zero
+  return sizeof(S) == 4 ? S(__builtin_fabsf(a)) : S(__builtin_fabs(a));
 }
 template <class S>
 STICKSLIP_INLINE S min(S a, S b) {
