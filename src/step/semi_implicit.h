@@ -38,11 +38,9 @@ STICKSLIP_INLINE void compute_free_motion(RobotLanes<S>& robot, S dt) {
   const Spatial<S> on_base = driven ? base_control(robot) : zero_spatial<S>();
   in.tau = driven ? robot.force + robot.offset() : nullptr;
   in.base_force = driven ? &on_base : nullptr;
-  if (!robot.control.wrenches) return dynamics::compute_free_motion(t, in);
-  using namespace dynamics;
-  walk<kPositions | kInertias | kBias>(t, in);
-  add_wrenches(robot);
-  walk<kFactor | kSolveTransposed | kLinkForces>(t, in);
+  in.base_wrench = robot.control.base_wrench;
+  in.wrenches = robot.control.wrenches;
+  dynamics::compute_free_motion(t, in);
 }
 
 /// One time step. The state of a lane only changes if its result is finite.
