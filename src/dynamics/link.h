@@ -35,15 +35,17 @@ STICKSLIP_INLINE void place_inertia(const LinkInertia<K>& c, LinkState<W>& link)
                                       rotate(r, wide_sym3<W>(c.inertia)));
 }
 
-/// (D4), (D6): velocity and acceleration of the parent become those of the link. Returns minus the
+/// (D6): velocity, acceleration and A of the parent become those of the link. Returns minus the
 /// inertial force.
 template <class W>
-STICKSLIP_INLINE Spatial<W> bias_of_link(const RigidInertia<W>& inertia, const Spatial<W>& axis,
-                                         W rate, Spatial<W>& v, Spatial<W>& a) {
-  const Spatial<W> joint = axis * rate;
-  v = v + joint;
-  a = a + cross_motion(v, joint);
-  return -cross_force(v, inertia * v, inertia * a);
+STICKSLIP_INLINE Spatial<W> bias_of_link(const LinkState<W>& link, bool prismatic, W rate,
+                                         Spatial<W>& v, Spatial<W>& a, Mat3<W>& field) {
+  const Vec3<W> turn = link.axis.ang * rate;
+  v = {v.ang + turn, madd(link.axis.lin, rate, v.lin)};
+  a.ang = cross(v.ang, turn, a.ang);
+  change_field(v.ang, a.ang, link.position, field, a.lin);
+  if (prismatic) a.lin = cross(v.ang, link.axis.lin * (rate + rate), a.lin);
+  return -inertial_force(link.inertia, v.ang, a, field);
 }
 
 /// (D13): this joint's coordinate of y = L u; `v` is the parent's velocity.

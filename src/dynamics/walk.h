@@ -52,8 +52,8 @@ STICKSLIP_INLINE void start_base(Tree<S>& t, const WalkInput<S>& in) {
   if constexpr (kParts & (kVelocities | kBias)) base.velocity = {in.angular_velocity, zero3<S>()};
   if constexpr (kParts & kBias) {
     base.acceleration = {zero3<S>(), -in.gravity};
-    base.force =
-        -cross_force(base.velocity, base.inertia * base.velocity, base.inertia * base.acceleration);
+    base.force = -inertial_force(base.inertia, in.angular_velocity, base.acceleration,
+                                 acceleration_field(in.angular_velocity, zero3<S>()));
   }
   if constexpr (kParts & kLinkForces)
     if (in.base_force) base.force = base.force + *in.base_force;
@@ -111,10 +111,11 @@ void chain_bias(Tree<S>& t, const Bundle& b, const S* rates) {
   using W = Wide<S>;
   Spatial<W> v = from_parents<S, Spatial>(t, b, t.base.velocity, &LinkState<W>::velocity);
   Spatial<W> a = from_parents<S, Spatial>(t, b, t.base.acceleration, &LinkState<W>::acceleration);
+  Mat3<W> field = acceleration_field(v.ang, a.ang);
   for (int slot = b.first_slot; slot < b.first_slot + b.length; ++slot) {
     LinkState<W>& link = t.links[slot];
-    link.force =
-        bias_of_link(link.inertia, link.axis, load_lanes(rates, t.slots[slot].joint), v, a);
+    const Slot& s = t.slots[slot];
+    link.force = bias_of_link(link, s.prismatic, load_lanes(rates, s.joint), v, a, field);
     link.velocity = v;
     link.acceleration = a;
   }
