@@ -181,7 +181,7 @@ void PackLanes<S>::load_control(const EnvArrays& arrays, long first) {
   repeat(target_, t.num_joints);
   c.gravity = {gravity_[0], gravity_[1], gravity_[2]};
   const auto some = [&](S x) { return !((x >= zero) & (x <= zero)); };  // also NaN
-  Mask<S> gains = step::none<S>(), forces = step::none<S>(), on_base = step::none<S>();
+  Mask<S> gains = step::none<S>(), forces = gains, on_base = gains, pushed = gains;
   for (int j = 0; j < t.num_joints; ++j) gains = gains | some(kp_[j]) | some(kd_[j]);
   if (arrays.force) {
     load_rows(rows(arrays.generalized_force, t.nu, first), t.nu, force_);
@@ -192,14 +192,13 @@ void PackLanes<S>::load_control(const EnvArrays& arrays, long first) {
     for (int k = 0; k < t.nu; ++k) force_[k] = zero;
   }
   load_wrenches(arrays, first);
-  if (c.wrenches) {
-    forces = !step::none<S>();
-    on_base = !step::none<S>();
-  }
+  if (c.wrenches)
+    for (int k = 0; k < 6 * t.num_bodies; ++k) pushed = pushed | some(scratch_[k]);
+  forces = forces | pushed;
   c.pd = any(gains);
   c.force = any(forces);
   c.drives_joints = gains | forces;
-  c.drives_base = on_base;
+  c.drives_base = on_base | pushed;
 }
 
 template <class S>
