@@ -10,7 +10,8 @@ namespace stickslip::dynamics::inline STICKSLIP_KERNELS {
 /// velocity.
 template <class S>
 void compute_free_motion(Tree<S>& t, const WalkInput<S>& in) {
-  walk<kPositions | kInertias | kBias | kFactor | kSolveTransposed | kLinkForces>(t, in);
+  walk<kPositions | kInertias | kBias | kFactor | kSolveTransposed | kLinkForces | kWrenches>(t,
+                                                                                              in);
 }
 
 /// x = L^-T (-h) with the factor of these positions: compute_bias, then solve_lower_transposed.

@@ -27,23 +27,25 @@ STICKSLIP_INLINE Spatial<W> move_to_link(const LinkConstants<K>& c, bool prismat
   return {axis, cross(p, axis)};
 }
 
-/// (D5) at pose (r, p), from constants of the model or of each environment.
+/// (D5) at the pose of the link, from constants of the model or of each environment.
 template <class W, class K>
-STICKSLIP_INLINE RigidInertia<W> inertia_at(const LinkInertia<K>& c, const Mat3<W>& r,
-                                            const Vec3<W>& p) {
-  return inertia_at_reference(W(c.mass), madd(r, wide3<W>(c.com), p),
-                              rotate(r, wide_sym3<W>(c.inertia)));
+STICKSLIP_INLINE void place_inertia(const LinkInertia<K>& c, LinkState<W>& link) {
+  const Mat3<W> r = link.rotation;
+  link.inertia = inertia_at_reference(W(c.mass), madd(r, wide3<W>(c.com), link.position),
+                                      rotate(r, wide_sym3<W>(c.inertia)));
 }
 
-/// (D4), (D6): velocity and acceleration of the parent become those of the link. Returns minus the
+/// (D6): velocity, acceleration and A of the parent become those of the link. Returns minus the
 /// inertial force.
 template <class W>
-STICKSLIP_INLINE Spatial<W> bias_of_link(const RigidInertia<W>& inertia, const Spatial<W>& axis,
-                                         W rate, Spatial<W>& v, Spatial<W>& a) {
-  const Spatial<W> joint = axis * rate;
-  v = v + joint;
-  a = a + cross_motion(v, joint);
-  return -cross_force(v, inertia * v, inertia * a);
+STICKSLIP_INLINE Spatial<W> bias_of_link(const LinkState<W>& link, bool prismatic, W rate,
+                                         Spatial<W>& v, Spatial<W>& a, Mat3<W>& field) {
+  const Vec3<W> turn = link.axis.ang * rate;
+  v = {v.ang + turn, madd(link.axis.lin, rate, v.lin)};
+  a.ang = cross(v.ang, turn, a.ang);
+  change_field(v.ang, a.ang, link.position, field, a.lin);
+  if (prismatic) a.lin = cross(v.ang, link.axis.lin * (rate + rate), a.lin);
+  return -inertial_force(link.inertia, v.ang, a, field);
 }
 
 /// (D13): this joint's coordinate of y = L u; `v` is the parent's velocity.
@@ -78,6 +80,14 @@ STICKSLIP_INLINE Spatial<W> solve_at_link(const Spatial<W>& f, const Spatial<W>&
   if (tau) on_joint = on_joint + *tau;
   link.x = on_joint * link.inv_root;
   return nmadd(link.arm, link.x, f);
+}
+
+/// A wrench at the center of mass of a body as a force at the base origin.
+template <class W>
+STICKSLIP_INLINE Spatial<W> force_of_wrench(const Spatial<W>& wrench, const RigidInertia<W>& body) {
+  const auto heavy = body.mass > constant<W>(0);
+  const W inverse = constant<W>(1) / select(heavy, body.mass, constant<W>(1));
+  return {cross(body.h * inverse, wrench.lin, wrench.ang), wrench.lin};
 }
 
 }  // namespace stickslip::dynamics::inline STICKSLIP_KERNELS

@@ -19,6 +19,7 @@ enum Part : unsigned {
   kFactor = 64,            // M + diag(diagonal) = L^T L
   kSolveTransposed = 128,  // x = L^-T (tau + force on the base)
   kLinkForces = 256,       // and the forces on the links take part
+  kWrenches = 512,         // adds wrenches to the forces on base and links
 };
 
 /// What a walk reads besides the tree; what none of its parts needs may stay unset.
@@ -33,6 +34,9 @@ struct WalkInput {
   const S* diagonal;             // (num_joints) or null
   const S* tau;                  // (num_joints) or null
   const Spatial<S>* base_force;  // on body 0, besides its bias force; or null
+  // At the centers of mass, world axes: of body 0 and per slot; both or none.
+  const Spatial<S>* base_wrench;
+  const Spatial<Wide<S>>* wrenches;
 };
 
 template <unsigned kParts, class S>
@@ -48,97 +52,147 @@ STICKSLIP_INLINE void start_base(Tree<S>& t, const WalkInput<S>& in) {
   if constexpr (kParts & (kVelocities | kBias)) base.velocity = {in.angular_velocity, zero3<S>()};
   if constexpr (kParts & kBias) {
     base.acceleration = {zero3<S>(), -in.gravity};
-    base.force =
-        -cross_force(base.velocity, base.inertia * base.velocity, base.inertia * base.acceleration);
+    base.force = -inertial_force(base.inertia, in.angular_velocity, base.acceleration,
+                                 acceleration_field(in.angular_velocity, zero3<S>()));
+  }
+  if constexpr (kParts & kLinkForces)
+    if (in.base_force) base.force = base.force + *in.base_force;
+  if constexpr (kParts & kWrenches)
+    if (in.base_wrench) base.force = base.force + force_of_wrench(*in.base_wrench, base.inertia);
+}
+
+// ---- one chain of every bundle lane: outward
+
+template <class S>
+void chain_positions(Tree<S>& t, const Bundle& b, const S* joints) {
+  using W = Wide<S>;
+  Mat3<W> r = from_parents<S, Mat3>(t, b, t.base.rotation, &LinkState<W>::rotation);
+  Vec3<W> p = from_parents<S, Vec3>(t, b, zero3<S>(), &LinkState<W>::position);
+  for (int slot = b.first_slot; slot < b.first_slot + b.length; ++slot) {
+    LinkState<W>& link = t.links[slot];
+    const Slot& s = t.slots[slot];
+    link.axis = move_to_link(t.constants[slot], s.prismatic, load_lanes(joints, s.joint), r, p);
+    link.rotation = r;
+    link.position = p;
   }
 }
 
+template <class S>
+void chain_inertias(Tree<S>& t, const Bundle& b) {
+  const int end = b.first_slot + b.length;
+  if (t.inertias)
+    for (int slot = b.first_slot; slot < end; ++slot)
+      place_inertia(t.inertias[slot], t.links[slot]);
+  else
+    for (int slot = b.first_slot; slot < end; ++slot)
+      place_inertia(t.constants[slot].inertial, t.links[slot]);
+}
+
+template <class S>
+void add_composite(Tree<S>& t, const Bundle& b) {
+  RigidInertia<Wide<S>> sum = t.links[b.first_slot].inertia;
+  for (int slot = b.first_slot + 1; slot < b.first_slot + b.length; ++slot)
+    sum = sum + t.links[slot].inertia;
+  add_lanes<S, RigidInertia>(sum, b.lanes, t.base.composite);
+}
+
+template <class S>
+void chain_velocities(Tree<S>& t, const Bundle& b, const S* rates) {
+  using W = Wide<S>;
+  Spatial<W> v = from_parents<S, Spatial>(t, b, t.base.velocity, &LinkState<W>::velocity);
+  for (int slot = b.first_slot; slot < b.first_slot + b.length; ++slot) {
+    v = madd(t.links[slot].axis, load_lanes(rates, t.slots[slot].joint), v);
+    t.links[slot].velocity = v;
+  }
+}
+
+template <class S>
+void chain_bias(Tree<S>& t, const Bundle& b, const S* rates) {
+  using W = Wide<S>;
+  Spatial<W> v = from_parents<S, Spatial>(t, b, t.base.velocity, &LinkState<W>::velocity);
+  Spatial<W> a = from_parents<S, Spatial>(t, b, t.base.acceleration, &LinkState<W>::acceleration);
+  Mat3<W> field = acceleration_field(v.ang, a.ang);
+  for (int slot = b.first_slot; slot < b.first_slot + b.length; ++slot) {
+    LinkState<W>& link = t.links[slot];
+    const Slot& s = t.slots[slot];
+    link.force = bias_of_link(link, s.prismatic, load_lanes(rates, s.joint), v, a, field);
+    link.velocity = v;
+    link.acceleration = a;
+  }
+}
+
+template <class S>
+void chain_multiply(Tree<S>& t, const Bundle& b, const Vec3<S>& translation, const S* rates) {
+  using W = Wide<S>;
+  Spatial<W> v = from_parents<S, Spatial>(t, b, t.base.velocity, &LinkState<W>::velocity);
+  for (int slot = b.first_slot; slot < b.first_slot + b.length; ++slot) {
+    LinkState<W>& link = t.links[slot];
+    link.x =
+        multiply_at_link(link, v, wide<W>(translation), load_lanes(rates, t.slots[slot].joint));
+    v = link.velocity;
+  }
+}
+
+// ---- inward
+
+template <class S>
+void chain_factor(Tree<S>& t, const Bundle& b, const S* diagonal) {
+  using W = Wide<S>;
+  const int last = b.first_slot + b.length - 1;
+  ArticulatedInertia<W> i = articulated(t.links[last].inertia);
+  if (b.has_children) i = i + t.links[last].from_children;
+  for (int slot = last;; --slot) {
+    LinkState<W>& link = t.links[slot];
+    W extra;
+    if (diagonal) extra = load_lanes(diagonal, t.slots[slot].joint);
+    i = factor_at_link(i, link.axis, diagonal ? &extra : nullptr, link);
+    if (slot == b.first_slot) break;
+    i = i + t.links[slot - 1].inertia;
+  }
+  add_to_parents<S, ArticulatedInertia>(t, b, i, t.base.articulated, &LinkState<W>::from_children);
+}
+
+template <bool kLinkForces, class S>
+void chain_solve_transposed(Tree<S>& t, const Bundle& b, const S* tau, Spatial<S>& on_base) {
+  using W = Wide<S>;
+  const int last = b.first_slot + b.length - 1;
+  Spatial<W> f = zero_spatial<W>();
+  for (int slot = last; slot >= b.first_slot; --slot) {
+    LinkState<W>& link = t.links[slot];
+    if constexpr (kLinkForces) f = f + link.force;
+    if (slot == last && b.has_children) f = f + link.force_from_children;
+    W on_joint;
+    if (tau) on_joint = load_lanes(tau, t.slots[slot].joint);
+    f = solve_at_link(f, link.axis, tau ? &on_joint : nullptr, link);
+  }
+  add_to_parents<S, Spatial>(t, b, f, on_base, &LinkState<W>::force_from_children);
+}
+
+// ---- all of them
+
 template <unsigned kParts, class S>
 STICKSLIP_INLINE void walk_outward(Tree<S>& t, const Bundle& b, const WalkInput<S>& in) {
-  using W = Wide<S>;
-  Mat3<W> r;
-  Vec3<W> p;
-  Spatial<W> v, a;
-  RigidInertia<W> sum;
-  if constexpr (kParts & kPositions) {
-    r = from_parents<S, Mat3>(t, b, t.base.rotation, &LinkState<W>::rotation);
-    p = from_parents<S, Vec3>(t, b, zero3<S>(), &LinkState<W>::position);
-  }
-  if constexpr (kParts & (kVelocities | kBias | kMultiply))
-    v = from_parents<S, Spatial>(t, b, t.base.velocity, &LinkState<W>::velocity);
+  if constexpr (kParts & kPositions) chain_positions(t, b, in.joints);
+  if constexpr (kParts & kInertias) chain_inertias(t, b);
+  if constexpr (kParts & kComposite) add_composite(t, b);
   if constexpr (kParts & kBias)
-    a = from_parents<S, Spatial>(t, b, t.base.acceleration, &LinkState<W>::acceleration);
-  const int last = b.first_slot + b.length - 1;
-  for (int slot = b.first_slot; slot <= last; ++slot) {
-    LinkState<W>& link = t.links[slot];
-    const LinkConstants<typename Tree<S>::K>& c = t.constants[slot];
-    Spatial<W> axis;
-    RigidInertia<W> inertia;
-    if constexpr (kParts & kPositions) {
-      axis = move_to_link(c, t.slots[slot].prismatic, load_lanes(in.joints, t.slots[slot].joint), r,
-                          p);
-      link.axis = axis, link.rotation = r, link.position = p;
-    } else if constexpr (kParts & (kVelocities | kBias)) {
-      axis = link.axis;
-    }
-    if constexpr (kParts & kInertias) {
-      if constexpr (!(kParts & kPositions)) r = link.rotation, p = link.position;
-      inertia = t.inertias ? inertia_at(t.inertias[slot], r, p) : inertia_at(c.inertial, r, p);
-      link.inertia = inertia;
-      if constexpr (kParts & kComposite) sum = slot == b.first_slot ? inertia : sum + inertia;
-    } else if constexpr (kParts & kBias) {
-      inertia = link.inertia;
-    }
-    W rate;
-    if constexpr (kParts & (kVelocities | kBias | kMultiply))
-      rate = load_lanes(in.rates, t.slots[slot].joint);
-    if constexpr (kParts & kMultiply)
-      link.x = multiply_at_link(link, v, wide<W>(in.linear_velocity), rate);
-    if constexpr (kParts & kBias) {
-      link.force = bias_of_link(inertia, axis, rate, v, a);
-      link.velocity = v;
-    } else if constexpr (kParts & kVelocities) {
-      v = madd(axis, rate, v);
-      link.velocity = v;
-    } else if constexpr (kParts & kMultiply) {
-      v = link.velocity;
-    }
-  }
-  if constexpr (kParts & kBias)
-    if (b.has_children) t.links[last].acceleration = a;
-  if constexpr (kParts & kComposite) add_lanes<S, RigidInertia>(sum, b.lanes, t.base.composite);
+    chain_bias(t, b, in.rates);
+  else if constexpr (kParts & kVelocities)
+    chain_velocities(t, b, in.rates);
+  if constexpr (kParts & kWrenches)
+    if (in.wrenches)
+      for (int slot = b.first_slot; slot < b.first_slot + b.length; ++slot)
+        t.links[slot].force =
+            t.links[slot].force + force_of_wrench(in.wrenches[slot], t.links[slot].inertia);
+  if constexpr (kParts & kMultiply) chain_multiply(t, b, in.linear_velocity, in.rates);
 }
 
 template <unsigned kParts, class S>
 STICKSLIP_INLINE void walk_inward(Tree<S>& t, const Bundle& b, const WalkInput<S>& in,
                                   Spatial<S>& on_base) {
-  using W = Wide<S>;
-  ArticulatedInertia<W> rest;
-  Spatial<W> f = zero_spatial<W>();
-  const int last = b.first_slot + b.length - 1;
-  for (int slot = last; slot >= b.first_slot; --slot) {
-    LinkState<W>& link = t.links[slot];
-    const Spatial<W> axis = link.axis;
-    if constexpr (kParts & kFactor) {
-      W extra;
-      if (in.diagonal) extra = load_lanes(in.diagonal, t.slots[slot].joint);
-      ArticulatedInertia<W> i = slot == last ? articulated(link.inertia) : rest + link.inertia;
-      if (slot == last && b.has_children) i = i + link.from_children;
-      rest = factor_at_link(i, axis, in.diagonal ? &extra : nullptr, link);
-    }
-    if constexpr (kParts & kSolveTransposed) {
-      if constexpr (kParts & kLinkForces) f = f + link.force;
-      if (slot == last && b.has_children) f = f + link.force_from_children;
-      W tau;
-      if (in.tau) tau = load_lanes(in.tau, t.slots[slot].joint);
-      f = solve_at_link(f, axis, in.tau ? &tau : nullptr, link);
-    }
-  }
-  if constexpr (kParts & kFactor)
-    add_to_parents<S, ArticulatedInertia>(t, b, rest, t.base.articulated,
-                                          &LinkState<W>::from_children);
+  if constexpr (kParts & kFactor) chain_factor(t, b, in.diagonal);
   if constexpr (kParts & kSolveTransposed)
-    add_to_parents<S, Spatial>(t, b, f, on_base, &LinkState<W>::force_from_children);
+    chain_solve_transposed<(kParts & kLinkForces) != 0>(t, b, in.tau, on_base);
 }
 
 /// The sums over the chains that hang on a link start at zero.
@@ -170,7 +224,7 @@ void walk(Tree<S>& t, const WalkInput<S>& in) {
     Spatial<S> on_base;
     if constexpr (kParts & kSolveTransposed) {
       if constexpr (kParts & kLinkForces)
-        on_base = in.base_force ? t.base.force + *in.base_force : t.base.force;
+        on_base = t.base.force;
       else
         on_base = in.base_force ? *in.base_force : zero_spatial<S>();
     }

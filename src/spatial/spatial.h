@@ -50,18 +50,6 @@ template <class S>
 STICKSLIP_INLINE S dot(const Spatial<S>& a, const Spatial<S>& b) {
   return dot(a.ang, b.ang) + dot(a.lin, b.lin);  // two short chains instead of a long one
 }
-/// Motion cross product v x m.
-template <class S>
-STICKSLIP_INLINE Spatial<S> cross_motion(const Spatial<S>& v, const Spatial<S>& m) {
-  return {cross(v.ang, m.ang), cross(v.ang, m.lin, cross(v.lin, m.ang))};
-}
-/// Force cross product v x* f, plus c.
-template <class S>
-STICKSLIP_INLINE Spatial<S> cross_force(const Spatial<S>& v, const Spatial<S>& f,
-                                        const Spatial<S>& c) {
-  return {cross(v.ang, f.ang, cross(v.lin, f.lin, c.ang)), cross(v.ang, f.lin, c.lin)};
-}
-
 /// Mass, first moment h = m c and rotational inertia about the reference point.
 template <class S>
 struct RigidInertia {
@@ -78,6 +66,42 @@ STICKSLIP_INLINE RigidInertia<S> operator+(const RigidInertia<S>& a, const Rigid
 template <class S>
 STICKSLIP_INLINE Spatial<S> operator*(const RigidInertia<S>& a, const Spatial<S>& v) {
   return {madd(a.rot, v.ang, cross(a.h, v.lin)), madd(v.lin, a.mass, -cross(a.h, v.ang))};
+}
+/// A with A r + a the acceleration of the point r of a body, a that of its point at the reference:
+/// [alpha]x + w w^T - |w|^2.
+template <class S>
+STICKSLIP_INLINE Mat3<S> acceleration_field(const Vec3<S>& w, const Vec3<S>& alpha) {
+  const S yy = w.y * w.y, zz = w.z * w.z;
+  return {{nmadd(w.y, w.y, -zz), madd(w.x, w.y, -alpha.z), madd(w.x, w.z, alpha.y),
+           madd(w.x, w.y, alpha.z), nmadd(w.x, w.x, -zz), madd(w.y, w.z, -alpha.x),
+           madd(w.x, w.z, -alpha.y), madd(w.y, w.z, alpha.x), nmadd(w.x, w.x, -yy)}};
+}
+/// `field` becomes the acceleration_field of another body that shares its acceleration at the point
+/// p; so `a`, at the reference, becomes that body's. Row by row: nine numbers less to hold.
+template <class S>
+STICKSLIP_INLINE void change_field(const Vec3<S>& w, const Vec3<S>& alpha, const Vec3<S>& p,
+                                   Mat3<S>& field, Vec3<S>& a) {
+  const S yy = w.y * w.y, zz = w.z * w.z;
+  const auto change_row = [&](S& x, S& y, S& z, const Vec3<S>& row, S& sum)
+                              __attribute__((always_inline)) {
+    sum = madd(z - row.z, p.z, madd(y - row.y, p.y, madd(x - row.x, p.x, sum)));
+    x = row.x, y = row.y, z = row.z;
+  };
+  S* m = field.m;
+  change_row(m[0], m[1], m[2],
+             {nmadd(w.y, w.y, -zz), madd(w.x, w.y, -alpha.z), madd(w.x, w.z, alpha.y)}, a.x);
+  change_row(m[3], m[4], m[5],
+             {madd(w.x, w.y, alpha.z), nmadd(w.x, w.x, -zz), madd(w.y, w.z, -alpha.x)}, a.y);
+  change_row(m[6], m[7], m[8],
+             {madd(w.x, w.z, -alpha.y), madd(w.y, w.z, alpha.x), nmadd(w.x, w.x, -yy)}, a.z);
+}
+/// Force that gives a body with angular velocity w the angular acceleration a.ang, its point at the
+/// reference the acceleration a.lin; `field` is the acceleration_field.
+template <class S>
+STICKSLIP_INLINE Spatial<S> inertial_force(const RigidInertia<S>& i, const Vec3<S>& w,
+                                           const Spatial<S>& a, const Mat3<S>& field) {
+  return {cross(w, i.rot * w, madd(i.rot, a.ang, cross(i.h, a.lin))),
+          madd(field, i.h, a.lin * i.mass)};
 }
 /// Inertia of a body with mass m, center of mass c and inertia `about_com`, seen from the reference
 /// point.

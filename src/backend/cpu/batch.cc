@@ -77,15 +77,13 @@ const std::vector<ContactPoint>& Batch::contact_points() const { return impl_->p
 const std::vector<int>& Batch::contact_shapes() const { return impl_->shapes; }
 
 std::size_t Batch::memory_bytes() const {
-  std::size_t sum = impl_->memory.bytes() + impl_->history_block.bytes() + impl_->constants.bytes();
+  std::size_t sum = impl_->memory.bytes() + impl_->history_block.bytes() +
+                    impl_->constants.bytes() + impl_->bodies.bytes();
   for (const auto& worker : impl_->workers) sum += worker->workspace.bytes();
   return sum;
 }
 
-BatchArray Batch::array(BatchField field) {
-  if (field == BatchField::kGeneralizedForce) impl_->force = true;
-  return impl_->memory.array(field);
-}
+BatchArray Batch::array(BatchField field) { return impl_->array(field); }
 
 StepStatus Batch::step(int steps) {
   if (steps < 0) reject(".step: the number of steps must be >= 0, got " + std::to_string(steps));

@@ -78,6 +78,7 @@ Batch::Impl::Impl(const World::Impl& world, const BatchOptions& o)
       settings(world.settings),
       padded(round_up(o.num_envs, kernels->width)),
       memory(scene.tables(), o.precision, o.num_envs, padded),
+      bodies(*model, layout, *kernels, padded),
       pool(thread_count(o, padded / kernels->width), o.pin_threads) {
   settings.clock = nullptr;
   fill_pack_scene();
@@ -180,6 +181,14 @@ void Batch::Impl::reset(long env, const double* q, const double* u) {
   for (const BatchField f : {kStatus, kResidual, kTime}) memory.set(f, env, 0, 0);
 }
 
+BatchArray Batch::Impl::array(BatchField field) {
+  using enum BatchField;
+  if (field == kGeneralizedForce) force = true;
+  const bool of_bodies = field == kBodyMass || field == kBodyCom || field == kBodyInertia;
+  if (of_bodies && !bodies.used()) bodies.allocate(memory);
+  return memory.array(field);
+}
+
 backend::EnvArrays Batch::Impl::env_arrays() {
   using enum BatchField;
   const auto parameter = [&](BatchField f, bool optional) -> backend::Parameter {
@@ -200,10 +209,6 @@ backend::EnvArrays Batch::Impl::env_arrays() {
   a.kd = parameter(kKd, false);
   a.friction = parameter(kFriction, false);
   a.gravity = parameter(kGravity, false);
-  const bool bodies = memory.has(kBodyMass) || memory.has(kBodyCom) || memory.has(kBodyInertia);
-  a.body_mass = parameter(kBodyMass, !bodies);
-  a.body_com = parameter(kBodyCom, !bodies);
-  a.body_inertia = parameter(kBodyInertia, !bodies);
   a.external_wrench = parameter(kExternalWrench, true);
   a.force = force;
   a.history = history_block.data();
@@ -213,8 +218,13 @@ backend::EnvArrays Batch::Impl::env_arrays() {
 void Batch::Impl::step_pack(void* self, int thread, long pack) {
   Impl& b = *static_cast<Impl*>(self);
   Worker& w = *b.workers[thread];
+  backend::PackInertias inertias;
+  if (b.bodies.used()) {
+    b.bodies.refresh(b.memory, pack);
+    inertias = {b.bodies.links(pack), b.bodies.base(pack)};
+  }
   const std::uint32_t bits =
-      b.kernels->step(w.workspace.data(), b.running_, w.settings, pack * b.kernels->width,
+      b.kernels->step(w.workspace.data(), b.running_, inertias, w.settings, pack * b.kernels->width,
                       b.options.num_envs, b.running_steps_);
   if (bits) b.bits_.fetch_or(bits, std::memory_order_relaxed);
 }

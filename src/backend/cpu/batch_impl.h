@@ -5,6 +5,7 @@
 #include <atomic>
 
 #include "backend/cpu/batch_memory.h"
+#include "backend/cpu/body_parameters.h"
 #include "backend/cpu/instruction_sets.h"
 #include "backend/cpu/thread_pool.h"
 #include "step/host_solver.h"
@@ -27,6 +28,7 @@ struct Batch::Impl {
   };
 
   std::uint32_t step(int steps);
+  BatchArray array(BatchField field);
   backend::EnvArrays env_arrays();
   void reset(long env, const double* q, const double* u);
   /// Number `row` of what an environment carries besides q and u (PackHistory).
@@ -51,6 +53,7 @@ struct Batch::Impl {
   long padded;
   backend::BatchMemory memory;
   backend::Block history_block;
+  backend::BodyParameters bodies;
   bool force = false;  // generalized forces are in use
   std::vector<double> start_q, start_u;
   std::vector<ContactPoint> points;

@@ -34,10 +34,11 @@ static void prepare(void* workspace, const PackScene& scene) {
 }
 
 static std::uint32_t step_pack(void* workspace, const EnvArrays& arrays,
-                               const step::StepSettings& settings, long first, long num_envs,
-                               int steps) {
+                               const PackInertias& inertias, const step::StepSettings& settings,
+                               long first, long num_envs, int steps) {
   auto& lanes = *static_cast<PackLanes<Lanes>*>(workspace);
   lanes.load(arrays, first, num_envs);
+  lanes.use_inertias(inertias);
   for (int k = 0; k < steps; ++k) {
     if (settings.energy_safe)
       step::step_energy_safe(lanes.robot(), settings);

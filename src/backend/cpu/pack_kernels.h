@@ -31,10 +31,9 @@ struct EnvArrays {
   std::uint32_t* status;
   double* time;
   Parameter kp, kd, friction, gravity;
-  Parameter body_mass, body_com, body_inertia;  // optional: else the model's
-  Parameter external_wrench;                    // optional
-  bool force;                                   // generalized_force is in use
-  void* history;                                // T, see PackHistory
+  Parameter external_wrench;  // optional
+  bool force;                 // generalized_force is in use
+  void* history;              // T, see PackHistory
 };
 
 /// What an environment carries from step to step besides q and u, per pack: T (numbers, lanes).
@@ -52,6 +51,12 @@ struct PackHistory {
         numbers(fresh + 1) {}
 };
 
+/// Mass properties of a pack's environments; null: the model's.
+struct PackInertias {
+  const void* links = nullptr;  // T (slots, 10, lanes): LinkInertia
+  const void* base = nullptr;   // T (10, width): of body 0
+};
+
 /// One compiled pack. Every function is free of allocation and of shared state.
 struct PackKernels {
   const char* instruction_set;
@@ -63,8 +68,8 @@ struct PackKernels {
   void (*prepare)(void* workspace, const PackScene&);
   /// Steps the environments of a pack; `first` is a multiple of the width. The same workspace may
   /// serve any pack. Returns the status bits of its environments below `num_envs`, or-ed.
-  std::uint32_t (*step)(void* workspace, const EnvArrays&, const step::StepSettings&, long first,
-                        long num_envs, int steps);
+  std::uint32_t (*step)(void* workspace, const EnvArrays&, const PackInertias&,
+                        const step::StepSettings&, long first, long num_envs, int steps);
 };
 
 }  // namespace stickslip::backend

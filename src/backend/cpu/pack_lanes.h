@@ -21,6 +21,7 @@ class PackLanes {
   /// starts afresh; one that is not a state (NaN, no unit quaternion) is set aside. Lanes beyond
   /// num_envs repeat the last environment.
   void load(const EnvArrays& arrays, long first, long num_envs);
+  void use_inertias(const PackInertias& inertias);
   /// After each step of the robot.
   void count_step();
   /// Status bits of the environments below num_envs, or-ed.
@@ -31,7 +32,6 @@ class PackLanes {
   void lay_out_tree(contact::Arena& arena, const PackScene& scene);
   void load_control(const EnvArrays& arrays, long first);
   void load_parameter(const Parameter& p, int n, long first, S* out);
-  void load_inertias(const EnvArrays& arrays, long first);
   void load_wrenches(const EnvArrays& arrays, long first);
   void check_state();
   /// Lanes without an environment become copies of the last one that has one.
@@ -76,7 +76,8 @@ void PackLanes<S>::lay_out(contact::Arena& arena, const PackScene& scene) {
   last_q_ = arena.take<S>(t.nq);
   last_u_ = arena.take<S>(t.nu);
   wrenches_ = arena.take<Spatial<dynamics::Wide<S>>>(t.num_slots);
-  scratch_ = arena.take<S>(6 * t.num_bodies + 3 * t.num_points);
+  scratch_ = arena.take<S>(6 * t.num_bodies);
+  robot_.last_contacts = {arena.take<S>(3 * t.num_points), arena.take<Mask<S>>(t.num_points)};
   step::LaneControl<S>& c = robot_.control;
   c = {force_,  kp_,        kd_,  target_, friction_,       nullptr,
        nullptr, zero3<S>(), true, false,   step::none<S>(), step::none<S>()};
@@ -93,9 +94,7 @@ void PackLanes<S>::lay_out_tree(contact::Arena& arena, const PackScene& scene) {
   tree_.constants =
       static_cast<const dynamics::LinkConstants<dynamics::WideConstant<S>>*>(scene.constants);
   tree_.links = arena.take<dynamics::LinkState<dynamics::Wide<S>>>(scene.num_slots);
-  tree_.base_mass = constant<S>(scene.base_mass);
-  for (int k = 0; k < 3; ++k) tree_.base_com[k] = constant<S>(scene.base_com[k]);
-  for (int k = 0; k < 6; ++k) tree_.base_inertia[k] = constant<S>(scene.base_inertia[k]);
+  use_inertias({});
 }
 
 template <class S>
@@ -182,7 +181,7 @@ void PackLanes<S>::load_control(const EnvArrays& arrays, long first) {
   repeat(target_, t.num_joints);
   c.gravity = {gravity_[0], gravity_[1], gravity_[2]};
   const auto some = [&](S x) { return !((x >= zero) & (x <= zero)); };  // also NaN
-  Mask<S> gains = step::none<S>(), forces = step::none<S>(), on_base = step::none<S>();
+  Mask<S> gains = step::none<S>(), forces = gains, on_base = gains, pushed = gains;
   for (int j = 0; j < t.num_joints; ++j) gains = gains | some(kp_[j]) | some(kd_[j]);
   if (arrays.force) {
     load_rows(rows(arrays.generalized_force, t.nu, first), t.nu, force_);
@@ -192,20 +191,26 @@ void PackLanes<S>::load_control(const EnvArrays& arrays, long first) {
   } else {
     for (int k = 0; k < t.nu; ++k) force_[k] = zero;
   }
-  load_inertias(arrays, first);
   load_wrenches(arrays, first);
-  if (c.wrenches) {
-    forces = !step::none<S>();
-    on_base = !step::none<S>();
-  }
+  if (c.wrenches)
+    for (int k = 0; k < 6 * t.num_bodies; ++k) pushed = pushed | some(scratch_[k]);
+  forces = forces | pushed;
   c.pd = any(gains);
   c.force = any(forces);
   c.drives_joints = gains | forces;
-  c.drives_base = on_base;
+  c.drives_base = on_base | pushed;
 }
 
 template <class S>
-void PackLanes<S>::load_inertias(const EnvArrays&, long) {}
+void PackLanes<S>::use_inertias(const PackInertias& inertias) {
+  tree_.inertias = static_cast<const dynamics::LinkInertia<dynamics::Wide<S>>*>(inertias.links);
+  const auto* base = static_cast<const dynamics::LinkInertia<S>*>(inertias.base);
+  tree_.base_mass = base ? base->mass : constant<S>(scene_.base_mass);
+  for (int k = 0; k < 3; ++k)
+    tree_.base_com[k] = base ? base->com[k] : constant<S>(scene_.base_com[k]);
+  for (int k = 0; k < 6; ++k)
+    tree_.base_inertia[k] = base ? base->inertia[k] : constant<S>(scene_.base_inertia[k]);
+}
 
 /// Wrenches (bodies, 6), force and torque, to the slots of the tree.
 template <class S>
@@ -258,7 +263,7 @@ std::uint32_t PackLanes<S>::store(const EnvArrays& arrays, const step::StepSetti
     step::copy_where(set_aside_, past + h.drift, t.nu, s.drift_acceleration);
     s.pending_gravity = select(set_aside_, past[h.pending], s.pending_gravity);
     s.fresh = (s.fresh & !set_aside_) | (set_aside_ & (past[h.fresh] > constant<S>(0.5)));
-    robot_.contacts.forget(set_aside_);
+    step::record_contacts(robot_, set_aside_, true);
   }
   store_rows(s.q, t.nq, rows(arrays.q, t.nq, first));
   store_rows(s.u, t.nu, rows(arrays.u, t.nu, first));
@@ -269,19 +274,12 @@ std::uint32_t PackLanes<S>::store(const EnvArrays& arrays, const step::StepSetti
   past[h.pending] = s.pending_gravity;
   past[h.fresh] = select(s.fresh, one, zero);
 
-  // Contacts of the last substep.
-  S* impulse = scratch_ + 6 * t.num_bodies;
-  for (int k = 0; k < 3 * t.num_points; ++k) impulse[k] = zero;
+  const step::LaneContacts<S>& last = robot_.last_contacts;
+  store_rows(last.impulse, 3 * t.num_points, rows(arrays.contact_impulse, 3 * t.num_points, first));
   std::uint8_t* active = arrays.contact_active + first * t.num_points;
-  for (long k = 0; k < long(kWidth) * t.num_points; ++k) active[k] = 0;
-  for (int i = 0; i < robot_.contacts.count(); ++i) {
-    const step::ActiveContact<S>& a = robot_.contacts.active(i);
-    for (int r = 0; r < 3; ++r)
-      impulse[3 * a.id + r] = select(a.active, robot_.contacts.impulse(i)[r], zero);
+  for (int k = 0; k < t.num_points; ++k)
     for (int lane = 0; lane < kWidth; ++lane)
-      active[long(lane) * t.num_points + a.id] = get_lane(a.active, lane);
-  }
-  store_rows(impulse, 3 * t.num_points, rows(arrays.contact_impulse, 3 * t.num_points, first));
+      active[long(lane) * t.num_points + k] = get_lane(last.active[k], lane);
 
   const Mask<S> non_finite = non_finite_ | set_aside_, unconverged = unconverged_ & !set_aside_;
   std::uint32_t bits = 0;
@@ -292,8 +290,9 @@ std::uint32_t PackLanes<S>::store(const EnvArrays& arrays, const step::StepSetti
     arrays.status[first + lane] = status;
     if (first + lane < num_envs) bits |= status;
     static_cast<T*>(arrays.residual)[first + lane] = dropped ? T(0) : get_lane(residual_, lane);
-    if (!dropped)
-      arrays.time[first + lane] += settings.time_step * double(get_lane(steps_done_, lane));
+    // Step by step, as a world counts.
+    for (T done = get_lane(steps_done_, lane); done > 0 && !dropped; done = done - 1)
+      arrays.time[first + lane] += settings.time_step;
   }
   return bits;
 }

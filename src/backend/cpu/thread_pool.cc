@@ -99,7 +99,6 @@ void ThreadPool::run(long items, Work work) {
     take_items(0);
     return;
   }
-  if (pin_) pin_to_core(0);
   busy_.store(static_cast<int>(workers_.size()), std::memory_order_relaxed);
   {
     const std::lock_guard lock(mutex_);

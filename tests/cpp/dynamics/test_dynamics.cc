@@ -40,7 +40,8 @@ struct Robots {
   }
 
   WalkInput<S> input() const {
-    return {quaternion, q.data(), w, w, rates.data(), gravity, extra.data(), rates.data(), &push};
+    return {quaternion,   q.data(),     w,     w,       rates.data(), gravity,
+            extra.data(), rates.data(), &push, nullptr, nullptr};
   }
   const Spatial<S> push{{S(1), S(2), S(3)}, {S(4), S(5), S(6)}};  // on the base
 };
@@ -115,7 +116,7 @@ std::vector<Value<S>> numbers(Robots<S>& r, bool with_composite) {
   std::vector<Value<S>> out;
   const auto add = [&](const auto& x) {
     const auto* from = reinterpret_cast<const Value<S>*>(&x);
-    out.insert(out.end(), from, from + sizeof(x) / sizeof(Value<S>));
+    out.insert(out.end(), from, from + sizeof(x) / (sizeof(Value<S>)));
   };
   for (const S& x : r.joints) add(x);
   add(r.base), add(r.t.base);
