@@ -130,7 +130,7 @@ bool good = true;
 template <class S>
 void time_task(const Task& task, const char* name) {
   constexpr int kLanes = ScalarTraits<S>::kWidth, kEach = kLanes > 1 ? 4 : 16;
-  constexpr int kSets = 24, kPasses = 400 / kEach;
+  constexpr int kSets = 24, kPasses = 2000 / kEach;
   Random rng(100 + (&task - kTasks));
   std::vector<std::unique_ptr<Block<S>>> blocks;
   for (int k = 0; k < kEach; ++k) blocks.push_back(std::make_unique<Block<S>>());

@@ -220,7 +220,8 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
   // The change of a sweep says little below what the residual has to reach.
   const S tolerance_squared =
       min(madd(relative * relative, fastest, absolute * absolute), allowed * allowed);
-  const auto finite = sum < constant<S>(1e30);  // false for NaN
+  // False for NaN, and where products of block entries would overflow.
+  const auto finite = sum < constant<S>(sizeof(Value<S>) == 4 ? 1e14 : 1e30);
   auto open = iterate<M, kMaxDissipation>(p, finite, tolerance_squared, o, info);
   S worst = certify<M, kMaxDissipation>(p);
   auto bad = finite & !(worst <= allowed);
