@@ -1,22 +1,24 @@
-# Flags every target shares (interface target stickslip_flags).
+# Flags every target shares: stickslip_flags_any_machine, and stickslip_flags with the minimum instruction set.
+add_library(stickslip_flags_any_machine INTERFACE)
 add_library(stickslip_flags INTERFACE)
-target_include_directories(stickslip_flags INTERFACE ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR}/src)
+target_link_libraries(stickslip_flags INTERFACE stickslip_flags_any_machine)
+target_include_directories(stickslip_flags_any_machine INTERFACE ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR}/src)
 # No implicit contraction: the compiler may not choose where a fused multiply-add goes, or the bits would depend on it.
-target_compile_options(stickslip_flags INTERFACE -Wall -Wextra -Wno-psabi -ffp-contract=off -fno-math-errno)
+target_compile_options(stickslip_flags_any_machine INTERFACE -Wall -Wextra -Wno-psabi -ffp-contract=off -fno-math-errno)
 if(CMAKE_CXX_COMPILER_ID MATCHES "Clang")
   # Masks of kernels are combined with & and |, also where a mask is a bool.
-  target_compile_options(stickslip_flags INTERFACE -Wno-bitwise-instead-of-logical)
+  target_compile_options(stickslip_flags_any_machine INTERFACE -Wno-bitwise-instead-of-logical)
 endif()
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   # AVX2 + FMA (2013) is the minimum: madd() must be one instruction.
   target_compile_options(stickslip_flags INTERFACE -march=x86-64-v3)
 endif()
 if(STICKSLIP_WERROR)
-  target_compile_options(stickslip_flags INTERFACE -Werror)
+  target_compile_options(stickslip_flags_any_machine INTERFACE -Werror)
 endif()
 if(STICKSLIP_SANITIZE)
-  target_compile_options(stickslip_flags INTERFACE -fsanitize=address,undefined -fno-omit-frame-pointer -fno-sanitize-recover=all)
-  target_link_options(stickslip_flags INTERFACE -fsanitize=address,undefined)
+  target_compile_options(stickslip_flags_any_machine INTERFACE -fsanitize=address,undefined -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  target_link_options(stickslip_flags_any_machine INTERFACE -fsanitize=address,undefined)
 endif()
 
 # A library of one src/ folder: stickslip_library(<name> SOURCES ... LINKS ...)

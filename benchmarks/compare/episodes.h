@@ -8,6 +8,13 @@
 
 namespace stickslip::benchmarks {
 
+/// What changes an episode from outside (targets, resets) comes at multiples of so many steps.
+inline constexpr long kTick = 10;
+/// A task that ends when still does so when every |u| was below kStill [m/s, rad/s] at more than
+/// kStillTicks ticks in a row: 0.2 s.
+inline constexpr double kStill = 0.05;
+inline constexpr int kStillTicks = 20;
+
 /// Watches nothing: for timing.
 struct NoObserver {
   template <class Engine>
@@ -20,10 +27,9 @@ struct NoObserver {
 /// An engine has reset(episode), set_target(target), step(), velocities().
 template <class Engine, class Observer>
 int run_episodes(Engine& engine, const Scenario& s, int episode, long steps, Observer&& observer) {
-  constexpr double kStill = 0.05, kStillTime = 0.2;
   std::vector<double> target(s.kp.size());
   long k = 0;
-  double still = 0;
+  int still = 0;
   const auto reset = [&] {
     engine.reset(episode);
     s.target(episode, 0, target);
@@ -42,11 +48,11 @@ int run_episodes(Engine& engine, const Scenario& s, int episode, long steps, Obs
     ++k;
     observer.after_step(engine, k);
     bool over = k >= s.episode_steps;
-    if (s.ends_when_still) {
+    if (s.ends_when_still && k % kTick == 0) {
       double fastest = 0;
       for (const double rate : engine.velocities()) fastest = std::max(fastest, std::fabs(rate));
-      still = fastest < kStill ? still + kTimeStep : 0;
-      over = over || still > kStillTime;
+      still = fastest < kStill ? still + 1 : 0;
+      over = over || still > kStillTicks;
     }
     if (over) {
       ++episode;

@@ -1,6 +1,4 @@
 // stickslip and MuJoCo on the same tasks, interleaved, on one core. README.md has the rules.
-#include <sched.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -9,6 +7,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "benchmarks/compare/cores.h"
 #include "benchmarks/compare/report.h"
 #include "benchmarks/compare/robots.h"
 
@@ -18,8 +17,12 @@ namespace {
 constexpr const char* kUsage =
     "usage: stickslip_compare [options]\n"
     "  --tasks A,B         only tasks whose name starts so, any case (default: all)\n"
-    "  --engines A,B       of semi_implicit, energy_safe, mujoco (default: all)\n"
-    "  --steps N           per repetition (default 20000)\n"
+    "  --engines A,B       of mujoco; one robot: semi_implicit, energy_safe; many robots:\n"
+    "                      "
+    "batch_<float32|float64>[_energy_safe][_avx2|_avx512|_neon][_threads<N>]\n"
+    "                      (default: what benchmarks/README.md lists)\n"
+    "  --robots-per-batch N   a multiple of 16 (default 64)\n"
+    "  --steps N           per repetition (default 20000); a batch takes 16 N robot-steps\n"
     "  --repetitions N     counted ones; one more warms up (default 7)\n"
     "  --robots FOLDER     example-robot-data's robots folder: adds other robots than ANYmal\n"
     "  --urdf FILE         ANYmal's description\n"
@@ -67,7 +70,9 @@ Options parse(int argc, char** argv) {
     if (name == "--tasks")
       o.tasks = split(value);
     else if (name == "--engines")
-      o.settings.engines = split(value);
+      for (const std::string& e : split(value)) o.settings.engines.push_back(engine_choice(e));
+    else if (name == "--robots-per-batch")
+      o.settings.robots = static_cast<int>(positive(name, value));
     else if (name == "--steps")
       o.settings.steps = positive(name, value);
     else if (name == "--repetitions")
@@ -83,11 +88,13 @@ Options parse(int argc, char** argv) {
     else
       throw std::invalid_argument("unknown option " + name + "\n" + kUsage);
   }
-  for (const std::string& e : o.settings.engines)
-    if (e != "semi_implicit" && e != "energy_safe" && e != "mujoco")
-      throw std::invalid_argument("unknown engine '" + e + "'\n" + kUsage);
-  const auto& engines = o.settings.engines;
-  if (o.check && !engines.empty() && std::ranges::find(engines, "mujoco") == engines.end())
+  auto& engines = o.settings.engines;
+  if (engines.empty())
+    for (const std::string& e : default_engines()) engines.push_back(engine_choice(e));
+  if (o.settings.robots % 16)
+    throw std::invalid_argument("--robots-per-batch needs a multiple of 16: full packs");
+  if (o.check &&
+      std::ranges::none_of(engines, [](const auto& e) { return e.kind == EngineKind::kMujoco; }))
     throw std::invalid_argument("--check needs mujoco among the engines: aims are ratios to it");
   return o;
 }
@@ -99,23 +106,6 @@ bool wanted(const Scenario& s, const std::vector<std::string>& tasks) {
   return tasks.empty() || std::any_of(tasks.begin(), tasks.end(), starts_so);
 }
 
-/// Pins this process; returns the core, or -1.
-int pin(int core) {
-  cpu_set_t set;
-  if (core == -2) {
-    sched_getaffinity(0, sizeof set, &set);
-    core = CPU_ISSET(1, &set) ? 1 : 0;
-  }
-  if (core < 0) return -1;
-  CPU_ZERO(&set);
-  CPU_SET(core, &set);
-  if (sched_setaffinity(0, sizeof set, &set) != 0) {
-    std::printf("could not pin to core %d; running unpinned\n", core);
-    return -1;
-  }
-  return core;
-}
-
 int run(const Options& o) {
   std::vector<Scenario> scenarios = anymal_scenarios(o.urdf);
   if (!o.robots.empty())
@@ -124,8 +114,10 @@ int run(const Options& o) {
   if (scenarios.empty()) throw std::invalid_argument("no such task");
 
   const int core = pin(o.core);
-  std::printf("one thread, core %d, double, dt = 1 ms, %ld steps x %d repetitions, in turns\n\n",
-              core, o.settings.steps, o.settings.repetitions);
+  std::printf(
+      "one thread (but for _threads), core %d, dt = 1 ms, %ld steps x %d repetitions, in turns; "
+      "batches of %d robots\n\n",
+      core, o.settings.steps, o.settings.repetitions, o.settings.robots);
   print_header();
   std::vector<ScenarioResult> results;
   bool good = true;
@@ -134,10 +126,11 @@ int run(const Options& o) {
     results.push_back(measure(s, o.settings));
     print_result(results.back());
     good = print_faults(results.back()) && good;
-    if (o.check) good = print_missed_aims(results.back()) && good;
     least_share = std::min(least_share, results.back().core_share);
     disagreement = std::max(disagreement, results.back().disagreement);
   }
+  print_second_opinions(results);
+  if (o.check) good = print_missed_aims(results) && good;
   std::printf("\nmodels agree to %.1e; this thread had the core at least %.0f %% of the time\n",
               disagreement, 100 * least_share);
   if (!o.json.empty()) {

@@ -1,25 +1,26 @@
 #include "benchmarks/compare/measure.h"
 
+#include <stickslip/errors.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <ctime>
-#include <functional>
 
 #include "benchmarks/compare/agreement.h"
-#include "benchmarks/compare/mujoco_loop.h"
-#include "benchmarks/compare/stickslip_loop.h"
 
 namespace stickslip::benchmarks {
 namespace {
 
 constexpr double kAgreement = 1e-9;    // of the models
-constexpr double kBadResidual = 1e-4;  // share of steps above 1e-8 m/s that is let pass
+constexpr double kBadResidual = 1e-4;  // share of steps above the tolerance that is let pass
 
-/// Time this thread had a core [s]: others on a busy machine do not count, waiting does not exist.
-double thread_seconds() {
+/// Time this process had a core [s]: others on a busy machine do not count, waiting does not exist.
+/// Of all its threads, so that nobody gains who works in a thread of his own.
+double cpu_seconds() {
   timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
@@ -27,60 +28,79 @@ double wall_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-/// One engine with what it has been through; the engine's type is hidden behind two functions.
-struct Runner {
-  std::string name;
-  std::function<int(int episode)> time;              // one repetition; returns the next episode
-  std::function<int(int episode, Observer&)> watch;  // the same, observed
-  std::function<std::uint64_t(std::uint64_t)> hash;  // of the state, mixed into a given hash
-  std::vector<int> first_episode;                    // of each repetition
-  std::uint64_t state_hash = 0;                      // over the ends of all counted repetitions
+/// An engine with what it has been through.
+struct Contestant {
+  EngineChoice choice;
+  std::unique_ptr<Runner> runner;
+  std::uint64_t hash = 0;  // over the ends of all counted repetitions
   std::vector<double> microseconds;
 };
 
-template <class Engine>
-Runner make_runner(std::string name, std::shared_ptr<Engine> engine, const Scenario& s,
-                   long steps) {
-  Runner r;
-  r.name = std::move(name);
-  r.time = [=, &s](int episode) { return run_episodes(*engine, s, episode, steps, NoObserver{}); };
-  r.watch = [=, &s](int episode, Observer& o) {
-    return run_episodes(*engine, s, episode, steps, o);
-  };
-  r.hash = [=](std::uint64_t seed) { return hash_of(engine->velocities(), seed); };
-  return r;
-}
+struct Seconds {
+  double cpu = 0, wall = 0;  // of single threads
+};
 
-Runner make_runner(const std::string& name, const Scenario& s, long steps) {
-  if (name == "mujoco") return make_runner(name, std::make_shared<MujocoEngine>(s), s, steps);
-  const Integrator integrator =
-      name == "semi_implicit" ? Integrator::kSemiImplicit : Integrator::kEnergySafe;
-  return make_runner(name, std::make_shared<StickslipEngine>(s, integrator), s, steps);
-}
-
-Measurement watch(Runner& runner, const Scenario& s) {
-  Measurement m;
-  m.engine = runner.name;
-  m.microseconds = runner.microseconds;
-  Observer observer(s);
-  std::uint64_t hash = 0;
-  for (size_t rep = 1; rep < runner.first_episode.size(); ++rep) {
-    runner.watch(runner.first_episode[rep], observer);
-    hash = runner.hash(hash);
+/// One repetition.
+void time(Contestant& c, bool counted, Seconds& total) {
+  c.runner->prepare();
+  const double cpu = cpu_seconds(), wall = wall_seconds();
+  c.runner->run();
+  const double took = wall_seconds() - wall, worked = cpu_seconds() - cpu;
+  if (c.choice.threads <= 1) {
+    total.cpu += worked;
+    total.wall += took;
   }
-  m.findings = observer.finish();
-  m.findings.hash = hash;
-  const Findings& f = m.findings;
+  if (!counted) return;
+  c.microseconds.push_back(1e6 * (c.choice.wall_clock() ? took : worked) /
+                           static_cast<double>(c.runner->robot_steps()));
+  c.hash = c.runner->hash(c.hash);
+}
+
+/// The counted repetitions again, observed; returns the hash.
+std::uint64_t watch(Contestant& c, Observer& observer) {
+  std::uint64_t hash = 0;
+  c.runner->rewind();
+  for (size_t rep = 0; rep < c.microseconds.size(); ++rep) {
+    c.runner->watch(observer);
+    hash = c.runner->hash(hash);
+  }
+  return hash;
+}
+
+std::vector<std::string> faults_of(const Measurement& m, const Scenario& s, bool repeats) {
+  std::vector<std::string> faults;
   const auto fault = [&](bool wrong, const std::string& what) {
-    if (wrong) m.faults.push_back(what);
+    if (wrong) faults.push_back(what);
   };
-  fault(hash != runner.state_hash, "the observed runs did not repeat the timed ones");
+  const Findings& f = m.findings;
+  const bool ours = m.engine.kind != EngineKind::kMujoco;
+  const std::string who = ours ? "stickslip" : "MuJoCo";
+  char tolerance[16];
+  std::snprintf(tolerance, sizeof tolerance, "%.0e", f.residuals.tolerance());
+  fault(!repeats, "the observed runs did not repeat the timed ones");
   fault(f.exploded > 0, std::to_string(f.exploded) + " steps exploded");
-  fault(runner.name == "mujoco" && f.failed > 0, "MuJoCo warned of bad states");
-  fault(!(f.bad_residual_share <= kBadResidual), "residual above 1e-8 m/s in too many steps");
+  fault(f.failed > 0, who + " warned of bad states");
+  fault(ours && f.residuals.share_above() > kBadResidual,
+        std::string("residual above ") + tolerance + " m/s in too many steps");
+  fault(ours && f.residuals.unflagged() > 0, std::to_string(f.residuals.unflagged()) +
+                                                 " steps with a residual above " + tolerance +
+                                                 " m/s were not flagged");
   fault(!(f.base_height > s.lowest_base && f.base_height < s.highest_base),
         "base height " + std::to_string(f.base_height) + " m is not where this task ends");
-  return m;
+  return faults;
+}
+
+/// Batches that differ in instruction set or threads only must end in the same bits.
+void compare_hashes(std::vector<Measurement>& engines) {
+  const auto same_work = [](const Measurement& a, const Measurement& b) {
+    return a.engine.kind == EngineKind::kBatch && b.engine.kind == EngineKind::kBatch &&
+           a.engine.precision == b.engine.precision && a.engine.integrator == b.engine.integrator &&
+           a.robots == b.robots;
+  };
+  for (size_t i = 0; i < engines.size(); ++i)
+    for (size_t k = 0; k < i; ++k)
+      if (same_work(engines[i], engines[k]) && engines[i].findings.hash != engines[k].findings.hash)
+        engines[i].faults.push_back("it ends in other bits than " + engines[k].engine.name);
 }
 
 }  // namespace
@@ -94,50 +114,66 @@ double median(std::vector<double> values) {
 
 const Measurement* ScenarioResult::find(const std::string& engine) const {
   for (const Measurement& m : engines)
-    if (m.engine == engine) return &m;
+    if (m.engine.name == engine) return &m;
   return nullptr;
 }
 
-double ScenarioResult::ratio(const std::string& engine) const {
-  const Measurement *ours = find(engine), *theirs = find("mujoco");
-  if (!ours || !theirs) return 0;
+double ScenarioResult::ratio(const Measurement& m) const {
+  const Measurement* theirs = find(aim(m).against);
+  if (!theirs || theirs->microseconds.size() != m.microseconds.size()) return 0;
   std::vector<double> ratios;
-  for (size_t k = 0; k < ours->microseconds.size(); ++k)
-    ratios.push_back(theirs->microseconds[k] / ours->microseconds[k]);
+  for (size_t k = 0; k < m.microseconds.size(); ++k)
+    ratios.push_back(theirs->microseconds[k] / m.microseconds[k]);
   return median(ratios);
+}
+
+bool ScenarioResult::misses_aim(const Measurement& m) const {
+  // Without the other engine in the run there is nothing to miss.
+  const double reached = ratio(m);
+  return reached > 0 && reached < aim(m).ratio;
 }
 
 ScenarioResult measure(const Scenario& scenario, const Settings& settings) {
   ScenarioResult result;
   result.scenario = &scenario;
   result.disagreement = model_disagreement(scenario);
-  std::vector<Runner> runners;
-  for (const std::string& name : settings.engines)
-    runners.push_back(make_runner(name, scenario, settings.steps));
-
-  std::vector<int> next(runners.size(), 0);
-  const double wall = wall_seconds(), own = thread_seconds();
-  for (int rep = 0; rep <= settings.repetitions; ++rep)  // 0 warms up
-    for (size_t k = 0; k < runners.size(); ++k) {
-      Runner& r = runners[k];
-      r.first_episode.push_back(next[k]);
-      const double start = thread_seconds();
-      next[k] = r.time(next[k]);
-      if (rep == 0) continue;
-      r.microseconds.push_back(1e6 * (thread_seconds() - start) / settings.steps);
-      r.state_hash = r.hash(r.state_hash);
+  std::vector<Contestant> contestants;
+  for (const EngineChoice& choice : settings.engines) {
+    try {
+      contestants.push_back({choice, make_runner(choice, scenario, settings), 0, {}});
+    } catch (const ModelError& error) {  // such as an instruction set that is not there
+      result.engines.push_back({choice, 0, 0, "", {}, {}, {error.what()}});
     }
-  result.core_share = (thread_seconds() - own) / (wall_seconds() - wall);
+  }
 
-  for (Runner& r : runners) {
+  Seconds total;
+  for (int rep = 0; rep <= settings.repetitions; ++rep)  // 0 warms up
+    for (Contestant& c : contestants) {
+      if (rep == 1) c.runner->mark();
+      time(c, rep > 0, total);
+    }
+  result.core_share = total.wall > 0 ? total.cpu / total.wall : 1;
+
+  for (Contestant& c : contestants) {
+    Measurement m{c.choice,
+                  c.runner->robots(),
+                  c.runner->robot_steps(),
+                  c.runner->instruction_set(),
+                  c.microseconds,
+                  {},
+                  {}};
     if (settings.statistics) {
-      result.engines.push_back(watch(r, scenario));
-    } else {
-      result.engines.push_back({r.name, r.microseconds, {}, {}});
+      Observer observer(scenario, c.choice.tolerance());
+      const std::uint64_t hash = watch(c, observer);
+      m.findings = observer.finish();
+      m.findings.hash = hash;
+      m.faults = faults_of(m, scenario, hash == c.hash);
     }
     if (!(result.disagreement < kAgreement))
-      result.engines.back().faults.push_back("the engines do not simulate the same robot");
+      m.faults.push_back("the engines do not simulate the same robot");
+    result.engines.push_back(std::move(m));
   }
+  if (settings.statistics) compare_hashes(result.engines);
   return result;
 }
 

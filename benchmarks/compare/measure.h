@@ -1,19 +1,15 @@
 // Times the engines on a scenario, in turns, and then watches the same runs.
 #pragma once
-#include "benchmarks/compare/observer.h"
+#include "benchmarks/compare/runner.h"
 
 namespace stickslip::benchmarks {
 
-struct Settings {
-  long steps = 20'000;  ///< per repetition
-  int repetitions = 7;  ///< counted; one more warms up
-  std::vector<std::string> engines{"semi_implicit", "energy_safe", "mujoco"};
-  bool statistics = true;
-};
-
 struct Measurement {
-  std::string engine;
-  std::vector<double> microseconds;  ///< per step, one per repetition
+  EngineChoice engine;
+  int robots = 1;
+  long robot_steps = 0;              ///< of a repetition
+  std::string instruction_set;       ///< of a batch
+  std::vector<double> microseconds;  ///< per robot-step, one per repetition
   Findings findings;
   std::vector<std::string> faults;  ///< why the result does not count; empty: it does
 };
@@ -21,13 +17,15 @@ struct Measurement {
 struct ScenarioResult {
   const Scenario* scenario;
   double disagreement = 0;  ///< of the models, see model_disagreement
-  double core_share = 1;    ///< share of the wall clock that this thread had the core
+  double core_share = 1;    ///< share of the wall clock that a single thread had its core
   std::vector<Measurement> engines;
 
   const Measurement* find(const std::string& engine) const;
-  /// MuJoCo's time over an engine's: median over the repetitions of the ratio of the two runs that
-  /// followed each other. 0 where either was not run.
-  double ratio(const std::string& engine) const;
+  Aim aim(const Measurement& m) const { return aim_of(m.engine, *scenario, m.instruction_set); }
+  /// The time per robot-step of the engine that m is compared with over m's: median over the
+  /// repetitions of the ratio of two runs of the same round. 0 where there is none.
+  double ratio(const Measurement& m) const;
+  bool misses_aim(const Measurement& m) const;
 };
 
 double median(std::vector<double> values);

@@ -26,6 +26,8 @@ struct Row {
   double spread;   // of the targets [rad]; 0: hold the posture
   long hold_steps;
   double lowest_base, highest_base;       // see Scenario
+  double aim_batch;                       // see Scenario
+  const char* aim_group;                  // see Scenario
   std::map<std::string, double> posture;  // joints that are not at zero [rad]
 };
 
@@ -43,6 +45,8 @@ const std::vector<Row>& rows() {
        0,
        0.6,
        1.2,
+       20,
+       "humanoid",
        {{"leg_left_3_joint", -0.4},
         {"leg_left_4_joint", 0.8},
         {"leg_left_5_joint", -0.4},
@@ -61,6 +65,8 @@ const std::vector<Row>& rows() {
        0,
        0.4,
        0.9,
+       20,
+       "humanoid",
        {{"left_hip_pitch_joint", -0.3},
         {"left_knee_joint", 0.6},
         {"left_ankle_pitch_joint", -0.3},
@@ -79,6 +85,8 @@ const std::vector<Row>& rows() {
        200,
        -0.1,
        0.5,
+       0,
+       "",
        {}},
       {"UR5 swings",
        "ur_description/urdf/ur5_robot.urdf",
@@ -92,6 +100,8 @@ const std::vector<Row>& rows() {
        500,
        -1,
        1,
+       20,
+       "arm",
        {}},
       {"Panda swings",
        "panda_description/urdf/panda.urdf",
@@ -105,6 +115,8 @@ const std::vector<Row>& rows() {
        500,
        -1,
        1,
+       20,
+       "arm",
        {}},
   };
   return kRows;
@@ -144,6 +156,9 @@ Scenario make(const Row& row, const std::string& folder) {
   s.settle = row.settle;
   s.lowest_base = row.lowest_base;
   s.highest_base = row.highest_base;
+  s.aim_batch = row.aim_batch;
+  s.aim_batch_variants = false;
+  s.aim_group = row.aim_group;
   std::vector<double> posture(s.model->num_joints(), 0.0);
   for (const auto& [joint, angle] : row.posture) posture[s.model->joint_index(joint)] = angle;
 

@@ -1,4 +1,5 @@
-// Other robots than ANYmal, from the package example-robot-data: measured and shown, no aims.
+// Other robots than ANYmal, from the package example-robot-data: measured and shown. Batches have
+// an aim on one of the humanoids and one of the arms.
 #pragma once
 #include "benchmarks/compare/scenario.h"
 

@@ -1,7 +1,8 @@
 """Builds the comparison with MuJoCo, runs it, and writes benchmarks/results/<cpu>/<commit>.json and .md.
 
 Called by `make bench` with the interpreter that has cmake, ninja, urdfdom, mujoco and example-robot-data. Options that are
-not known here go to the program, for instance `--tasks hang --repetitions 15`.
+not known here go to the program, for instance `--tasks hang --repetitions 15`. `--markdown docs/throughput.md` puts the
+speeds into that page, `--from results.json` takes them from an earlier run.
 """
 
 from __future__ import annotations
@@ -81,38 +82,104 @@ def markdown(data: dict) -> str:
     lines = [
         f"# stickslip and MuJoCo {data['mujoco']}",
         "",
-        f"{data['date']}, commit {data['commit']}, {data['cpu']}, {data['compiler']}. One thread, double, dt = 1 ms, "
-        f"{data['repetitions']} repetitions of {data['steps']} steps in turns; medians. `benchmarks/README.md` has the rules.",
+        f"{measured_on(data)}, {data['compiler']}. dt = 1 ms, "
+        f"{data['repetitions']} repetitions of {data['steps']} steps in turns, batches of {data['robots']} robots; medians. "
+        "`benchmarks/README.md` has the rules.",
         "",
-        "| task | engine | us/step | ratio | aim | contacts | pushing | penetration mean / max [mm] | energy [J] | residual max [m/s] (share > 1e-8) |",
-        "|---|---|---|---|---|---|---|---|---|---|",
+        "| task | engine | us/step | steps/s | ratio | aim | contacts | pushing | penetration mean / max [mm] | energy [J] | residual 99.99 % / max [m/s] (share above) |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for result in data["results"]:
         for e in result["engines"]:
-            ours = e["engine"] != "mujoco"
-            energy = f"{e['energy_settled_J']:.1f} → {e['energy_at_end_J']:.1f}" if e["energy_settled_J"] else ""
-            depth = f"{1e3 * e['mean_penetration_m']:.4f} / {1e3 * e['max_penetration_m']:.3f}" if e["contacts"] else ""
-            cells = [
-                result["task"],
-                e["engine"] + (" **FAILED**: " + "; ".join(e["faults"]) if e["faults"] else ""),
-                f"{e['us_per_step']:.2f}",
-                f"{e['ratio']:.2f}" if ours and e["ratio"] else "",
-                f"{e['target_ratio']:g}" if e["target_ratio"] else "",
-                f"{e['contacts']:.2f}",
-                f"{e['pushing_contacts']:.2f}",
-                depth,
-                energy,
-                f"{e['max_residual_m_per_s']:.1e} ({e['share_above_1e-8']:.0e})" if ours else "",
-            ]
-            lines.append("| " + " | ".join(cells) + " |")
+            lines.append("| " + " | ".join([result["task"], *cells(e)]) + " |")
     return "\n".join(lines) + "\n"
+
+
+def measured_on(data: dict) -> str:
+    return f"{data['date']}, commit {data['commit']}, {data['cpu']}"
+
+
+def cells(e: dict) -> list[str]:
+    """One engine's row."""
+    name = e["engine"] + (" **FAILED**: " + "; ".join(e["faults"]) if e["faults"] else "")
+    if not e["us_per_repetition"]:  # it could not be run
+        return [name, *[""] * 9]
+    ours = "max_residual_m_per_s" in e
+    energy = f"{e['energy_settled_J']:.1f} → {e['energy_at_end_J']:.1f}" if e["energy_settled_J"] else ""
+    depth = f"{1e3 * e['mean_penetration_m']:.4f} / {1e3 * e['max_penetration_m']:.3f}" if e["contacts"] else ""
+    residual = (
+        f"{e['residual_99_99_m_per_s']:.0e} / {e['max_residual_m_per_s']:.0e} "
+        f"({e['share_above_tolerance']:.0e} > {e['residual_tolerance_m_per_s']:.0e})"
+        if ours
+        else ""
+    )
+    return [
+        name,
+        f"{e['us_per_step']:.3f}",
+        f"{e['robot_steps_per_s'] / 1e6:.3f} M",
+        f"{e['ratio']:.2f}" if e["ratio"] else "",
+        f"{e['target_ratio']:.3g}" if e["target_ratio"] else "",
+        f"{e['contacts']:.2f}",
+        f"{e['pushing_contacts']:.2f}",
+        depth,
+        energy,
+        residual,
+    ]
+
+
+BEGIN, END = "<!-- speeds: written by benchmarks/compare/run.py --markdown -->", "<!-- end of speeds -->"
+
+
+def speeds(data: dict) -> str:
+    """How fast every engine is on every task: a row per engine, and what that is relative to MuJoCo."""
+    lines = [f"{measured_on(data)}, MuJoCo {data['mujoco']}, {data['compiler']}:", ""]
+    for group in (data["results"][:5], data["results"][5:]):
+        if not group:
+            continue
+        engines = list(dict.fromkeys(e["engine"] for result in group for e in result["engines"]))
+        lines += [
+            "| us per robot-step (ratio) | " + " | ".join(result["task"] for result in group) + " |",
+            "|---|" + "---:|" * len(group),
+        ]
+        for engine in engines:
+            found = [{e["engine"]: e for e in result["engines"]}.get(engine) for result in group]
+            lines.append(f"| {engine} | " + " | ".join(speed(e) for e in found) + " |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def speed(e: dict | None) -> str:
+    """As in "0.125 (66)"."""
+    if e is None or not e["us_per_repetition"]:
+        return ""
+    return f"{e['us_per_step']:.3f}" + (f" ({e['ratio']:.3g})" if e["ratio"] else "")
+
+
+def write_speeds(data: dict, page: Path) -> None:
+    """Puts them between the marks of a page."""
+    text = page.read_text(encoding="utf-8")
+    if text.count(BEGIN) != 1 or text.count(END) != 1:
+        sys.exit(f"{page}: the marks {BEGIN} and {END} must be there once each")
+    before, rest = text.split(BEGIN)
+    page.write_text(before + BEGIN + "\n" + speeds(data) + END + rest.split(END)[1], encoding="utf-8")
+    print(f"speeds: {page}")
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", type=Path, default=ROOT / "build" / "bench", help="build folder")
     parser.add_argument("--output", type=Path, default=ROOT / "benchmarks" / "results", help="folder for the results")
+    parser.add_argument(
+        "--markdown", type=Path, metavar="PAGE", help="put the speeds into this page, between its marks"
+    )
+    parser.add_argument(
+        "--from", dest="earlier", type=Path, metavar="JSON", help="results of an earlier run; nothing is run"
+    )
     arguments, others = parser.parse_known_args()
+    if arguments.earlier is not None:
+        data = json.loads(arguments.earlier.read_text())
+        write_speeds(data, arguments.markdown) if arguments.markdown else print(speeds(data))
+        return 0
 
     program = build(arguments.build.resolve())
     robots = robots_folder()
@@ -139,6 +206,8 @@ def main() -> int:
     (folder / f"{data['commit']}.json").write_text(json.dumps(data, indent=1) + "\n")
     (folder / f"{data['commit']}.md").write_text(markdown(data))
     print(f"results: {folder}/{data['commit']}.json, .md")
+    if arguments.markdown is not None:
+        write_speeds(data, arguments.markdown)
     return status
 
 

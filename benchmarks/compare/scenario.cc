@@ -18,15 +18,15 @@ std::vector<Scenario> anymal_scenarios(const std::string& urdf) {
   struct Row {
     const char* name;
     TaskKind kind;
-    double lowest_base, highest_base, semi_implicit, energy_safe;
+    double lowest_base, highest_base, world, world_energy_safe, batch;
   };
   // HANG: only the feet collide, so the base hangs below the ground that the feet stand on.
   constexpr Row kRows[] = {
-      {"STAND", TaskKind::kStand, 0.42, 0.52, 4, 2.5},
-      {"TROT", TaskKind::kOpenLoopTrot, 0.35, 0.55, 4, 2.5},
-      {"HANG", TaskKind::kHang, -0.65, -0.25, 3, 2.5},
-      {"DROP", TaskKind::kDrop, 0.03, 0.45, 3, 2.5},
-      {"RANDOM", TaskKind::kRandom, 0.1, 1.0, 4, 2.5},
+      {"STAND", TaskKind::kStand, 0.42, 0.52, 7, 2.5, 50},
+      {"TROT", TaskKind::kOpenLoopTrot, 0.35, 0.55, 7, 2.5, 40},
+      {"HANG", TaskKind::kHang, -0.65, -0.25, 5, 2.5, 28},
+      {"DROP", TaskKind::kDrop, 0.03, 0.45, 5, 2.5, 25},
+      {"RANDOM", TaskKind::kRandom, 0.1, 1.0, 7, 2.5, 30},
   };
   const ModelPtr anymal = load_urdf(urdf);
   std::vector<Scenario> out;
@@ -49,8 +49,9 @@ std::vector<Scenario> anymal_scenarios(const std::string& urdf) {
     };
     s.lowest_base = row.lowest_base;
     s.highest_base = row.highest_base;
-    s.target_semi_implicit = row.semi_implicit;
-    s.target_energy_safe = row.energy_safe;
+    s.aim_world = row.world;
+    s.aim_world_energy_safe = row.world_energy_safe;
+    s.aim_batch = row.batch;
     out.push_back(std::move(s));
   }
   return out;

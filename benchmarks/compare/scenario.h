@@ -29,8 +29,12 @@ struct Scenario {
 
   /// A right result has its mean base height, after `settle`, between these [m].
   double lowest_base = -1e9, highest_base = 1e9;
-  /// Ratio to MuJoCo that is aimed at, per integrator; 0: measured only.
-  double target_semi_implicit = 0, target_energy_safe = 0;
+  /// Ratios to MuJoCo that are aimed at; 0: measured only. aim_batch: float32, semi_implicit,
+  /// AVX-512.
+  double aim_world = 0, aim_world_energy_safe = 0, aim_batch = 0;
+  bool aim_batch_variants = true;  ///< double precision and energy_safe have aims, too
+  /// Where not empty: of all tasks with this word one must reach its aims.
+  std::string aim_group;
 
   bool actuated() const;
 };

@@ -2,16 +2,22 @@
 
 namespace stickslip::benchmarks {
 
-StickslipEngine::StickslipEngine(const Scenario& scenario, Integrator integrator)
-    : scenario_(&scenario), q_(scenario.model->nq()), u_(scenario.model->nu()) {
+World make_world(const Scenario& scenario, Integrator integrator) {
   WorldOptions options;
   options.time_step = kTimeStep;
   options.integrator = integrator;
-  world_ = std::make_unique<World>(options);
-  if (scenario.ground) world_->add_ground();
-  robot_ = &world_->add_robot(scenario.model);
-  robot_->set_pd_gains(scenario.kp, scenario.kd);
+  World world(options);
+  if (scenario.ground) world.add_ground();
+  world.add_robot(scenario.model).set_pd_gains(scenario.kp, scenario.kd);
+  return world;
 }
+
+StickslipEngine::StickslipEngine(const Scenario& scenario, Integrator integrator)
+    : scenario_(&scenario),
+      world_(make_world(scenario, integrator)),
+      robot_(&world_.robot(0)),
+      q_(scenario.model->nq()),
+      u_(scenario.model->nu()) {}
 
 void StickslipEngine::reset(int episode) {
   scenario_->initial_state(episode, q_, u_);
@@ -27,7 +33,11 @@ void StickslipEngine::observe(Snapshot& out) const {
     out.pushing += c.impulse[2] > Snapshot::kLeastForce * kTimeStep;
   out.iterations = robot_->info().sweeps + robot_->info().newton_steps;
   out.residual = robot_->info().residual;
-  out.failed = robot_->info().status != StepStatus::kOk;
+  const auto says = [&](StepStatus bit) {
+    return (static_cast<unsigned>(robot_->info().status) & static_cast<unsigned>(bit)) != 0;
+  };
+  out.flagged = says(StepStatus::kNotConverged);
+  out.failed = says(StepStatus::kNonFinite);
   out.energy = scenario_->shows_energy ? robot_->mechanical_energy() : 0;
 }
 

@@ -2,12 +2,13 @@
 #pragma once
 #include <stickslip/world.h>
 
-#include <memory>
-
 #include "benchmarks/compare/episodes.h"
 #include "benchmarks/compare/observer.h"
 
 namespace stickslip::benchmarks {
+
+/// The robot on its ground, with its gains.
+World make_world(const Scenario& scenario, Integrator integrator);
 
 class StickslipEngine {
  public:
@@ -15,7 +16,7 @@ class StickslipEngine {
 
   void reset(int episode);
   void set_target(std::span<const double> target) { robot_->set_pd_target(target); }
-  void step() { world_->step(); }
+  void step() { world_.step(); }
   std::span<const double> velocities() const { return robot_->u(); }
 
   /// State and contacts after a step, for the observer.
@@ -23,7 +24,7 @@ class StickslipEngine {
 
  private:
   const Scenario* scenario_;
-  std::unique_ptr<World> world_;
+  World world_;
   Robot* robot_;
   std::vector<double> q_, u_;
 };

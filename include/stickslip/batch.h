@@ -1,5 +1,5 @@
-// Many copies of one scene in lockstep: one environment per SIMD lane, threads across packs of lanes
-// (docs/theory/batch.md).
+// Many copies of one scene in lockstep: one environment per SIMD lane, threads across packs of
+// lanes (docs/theory/batch.md).
 //
 // Bits of an environment depend on nothing but its own inputs: not on the width of a pack, the
 // instruction set, the number of threads, or its neighbors. In double precision they are those of a
@@ -22,15 +22,17 @@ enum class Precision { kFloat32, kFloat64 };
 struct BatchOptions {
   int num_envs = 1;  ///< >= 1
   Precision precision = Precision::kFloat32;
-  int num_threads = 0;       ///< 0: one per core that this process may use
-  bool pin_threads = false;  ///< binds thread k to the k-th of those cores
+  int num_threads = 0;  ///< 0: one per core that this process may use
+  /// Binds worker k = 1, 2, ... to the k-th of those cores; the calling thread, the first worker,
+  /// is left free.
+  bool pin_threads = false;
   /// "avx512", "avx2", "neon"; empty: what STICKSLIP_ISA says, else the widest the machine has.
   std::string instruction_set;
   int width = 0;  ///< lanes per pack, for tests; 0: what fills a register
 };
 
-/// Arrays of a batch, each (num_envs, ...), row-major, in memory that lives as long as the batch. T is
-/// float or double by its precision; joints, bodies, shapes in the order of the Model.
+/// Arrays of a batch, each (num_envs, ...), row-major, in memory that lives as long as the batch. T
+/// is float or double by its precision; joints, bodies, shapes in the order of the Model.
 enum class BatchField {
   kQ,                 ///< T (nq), read and written by steps
   kU,                 ///< T (nu), read and written by steps
@@ -42,13 +44,13 @@ enum class BatchField {
   kResidual,          ///< T (): largest contact residual of the last `step` [m/s]
   kTime,              ///< double (): since the last reset [s]
   // Parameters. Shared by all environments until one is asked for: only then each gets its own.
-  kKp,              ///< T (joints), >= 0
-  kKd,              ///< T (joints), >= 0
-  kFriction,        ///< T (contact shapes), >= 0
-  kGravity,         ///< T (3) [m/s^2]
-  kBodyMass,        ///< T (bodies) [kg]
-  kBodyCom,         ///< T (bodies, 3) in the body frame [m]
-  kBodyInertia,     ///< T (bodies, 6) xx xy xz yy yz zz about the center of mass, body axes [kg m^2]
+  kKp,           ///< T (joints), >= 0
+  kKd,           ///< T (joints), >= 0
+  kFriction,     ///< T (contact shapes), >= 0
+  kGravity,      ///< T (3) [m/s^2]
+  kBodyMass,     ///< T (bodies) [kg]
+  kBodyCom,      ///< T (bodies, 3) in the body frame [m]
+  kBodyInertia,  ///< T (bodies, 6) xx xy xz yy yz zz about the center of mass, body axes [kg m^2]
   kExternalWrench,  ///< T (bodies, 6) force [N], torque [N m] about the center of mass, world axes
 };
 
@@ -68,12 +70,13 @@ struct ContactPoint {
   int point;  ///< of the shape
 };
 
-/// Copies of a world in lockstep. Belongs to one thread at a time; its own threads work inside `step`.
+/// Copies of a world in lockstep. Belongs to one thread at a time; its own threads work inside
+/// `step`.
 class Batch {
  public:
-  /// Takes robot, gravity, ground, materials, options, gains, forces and the present state of `world`,
-  /// which must hold exactly one robot and be solved by kAuto. Throws ModelError that says what a batch
-  /// cannot hold and what to do.
+  /// Takes robot, gravity, ground, materials, options, gains, forces and the present state of
+  /// `world`, which must hold exactly one robot and be solved by kAuto. Throws ModelError that says
+  /// what a batch cannot hold and what to do.
   Batch(const World& world, const BatchOptions& options);
   ~Batch();
   Batch(Batch&&) noexcept;
@@ -99,11 +102,12 @@ class Batch {
   /// finite state. Throws ModelError for a negative number.
   StepStatus step(int steps = 1);
 
-  /// Puts environments `envs` into states q (envs, nq), u (envs, nu), row-major; empty: the state that
-  /// the world had. Forgets warm starts; clears status, residual, impulses and time. Throws ModelError
-  /// for an index out of range or twice, wrong lengths, NaN, or a quaternion that is not near unit
-  /// length (it is normalized); nothing has changed then.
-  void reset(std::span<const std::int64_t> envs, std::span<const double> q, std::span<const double> u);
+  /// Puts environments `envs` into states q (envs, nq), u (envs, nu), row-major; empty: the state
+  /// that the world had. Forgets warm starts; clears status, residual, impulses and time. Throws
+  /// ModelError for an index out of range or twice, wrong lengths, NaN, or a quaternion that is not
+  /// near unit length (it is normalized); nothing has changed then.
+  void reset(std::span<const std::int64_t> envs, std::span<const double> q,
+             std::span<const double> u);
 
   /// Everything that changes in a step, as bytes; `load_state` replays bit for bit. Inputs and
   /// parameters are not in it. Throws ModelError if the blob is not of such a batch.

@@ -13,6 +13,7 @@ namespace stickslip::python {
 void bind_model(nanobind::module_& m);
 void bind_contact(nanobind::module_& m);
 void bind_world(nanobind::module_& m);
+void bind_batch(nanobind::module_& m);
 void bind_scenes(nanobind::module_& m);
 void bind_problems(nanobind::module_& m);
 

@@ -26,6 +26,7 @@ NB_MODULE(_core, m) {
   stickslip::python::bind_model(m);
   stickslip::python::bind_contact(m);
   stickslip::python::bind_world(m);
+  stickslip::python::bind_batch(m);
   stickslip::python::bind_scenes(m);
   stickslip::python::bind_problems(m);
 }

@@ -12,6 +12,7 @@ _cpu.check()
 
 from stickslip import assets, problems  # noqa: E402
 from stickslip._core import Model, ModelBuilder, ModelError, Pose, load_urdf, parse_urdf  # noqa: E402
+from stickslip.batch import Batch, ContactPoint  # noqa: E402
 from stickslip.contact import (  # noqa: E402
     Certificate,
     ContactProblem,
@@ -26,8 +27,10 @@ from stickslip.world import Contact, Robot, SolveInfo, StepError, StepStatus, Wo
 __version__ = _version("stickslip")
 
 __all__ = [
+    "Batch",
     "Certificate",
     "Contact",
+    "ContactPoint",
     "ContactProblem",
     "ContactSolution",
     "Model",

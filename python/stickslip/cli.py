@@ -35,6 +35,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     paper.set_defaults(run=_paper)
     _add_solve(commands)
+    _add_bench(commands)
     return parser
 
 
@@ -95,6 +96,39 @@ def _add_solve(commands: argparse._SubParsersAction) -> None:
     solve.set_defaults(run=_solve)
 
 
+def _add_bench(commands: argparse._SubParsersAction) -> None:
+    bench = commands.add_parser(
+        "bench",
+        help="time batches of robots, beside MuJoCo where it is installed",
+        description="Steps many robots in a batch and prints robot-steps per second, the time of each stage, contact residuals and "
+        "failures, beside mujoco.rollout on the same task. Exit status: 0 if all went well, 1 if a robot-step was not finite, or "
+        "its contacts were not solved and it does not say so, 2 for bad input.",
+    )
+    bench.add_argument(
+        "--task",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="NAME",
+        help="stand, trot, hang, drop, random (ANYmal B; default: all of them), or URDF files of other robots",
+    )
+    bench.add_argument("--base", choices=("floating", "fixed"), default="floating", help="of robots of URDF files")
+    bench.add_argument("--envs", type=int, default=1024, metavar="N", help="robots (default: %(default)s)")
+    bench.add_argument("--threads", type=int, default=0, metavar="N", help="0: one per core (default)")
+    bench.add_argument("--dtype", choices=("float32", "float64"), default="float32", help="(default: %(default)s)")
+    bench.add_argument(
+        "--integrator", choices=("energy_safe", "semi_implicit"), default="energy_safe", help="(default: %(default)s)"
+    )
+    bench.add_argument("--steps", type=int, default=2000, metavar="N", help="of each robot (default: %(default)s)")
+    bench.add_argument(
+        "--instruction-set", choices=("avx2", "avx512", "neon"), help="(default: the widest that the machine has)"
+    )
+    bench.add_argument("--no-mujoco", dest="mujoco", action="store_false", help="do not run MuJoCo beside it")
+    bench.add_argument("--markdown", action="store_true", help="print the tables in Markdown")
+    bench.add_argument("--json", type=Path, metavar="FILE", help="write everything, with all digits")
+    bench.set_defaults(run=_bench)
+
+
 def _paper(arguments: argparse.Namespace) -> int:
     from stickslip import paper  # matplotlib and rich load here, and only here
 
@@ -105,6 +139,12 @@ def _solve(arguments: argparse.Namespace) -> int:
     from stickslip.compare_solvers.command import solve_command
 
     return solve_command(arguments)
+
+
+def _bench(arguments: argparse.Namespace) -> int:
+    from stickslip.bench.command import bench_command
+
+    return bench_command(arguments)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

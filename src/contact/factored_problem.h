@@ -6,10 +6,10 @@
 // private part (dofs of a branch that no other contact touches) [1/kg]; c0_i offset velocity [m/s].
 // No off-diagonal Delassus block is ever formed.
 //
-// Layout: rows are kept twice, as columns of three (velocity: 3 rows at once) and transposed in
-// chunks (update of w: a chunk of dofs at once). For a plain scalar a chunk is a 4-lane pack, for a
-// pack it is one dof: either way each number goes through the same operations in the same order, so
-// a lane of a pack has the bits of the plain scalar.
+// Layout: a plain scalar keeps rows twice, as columns of three (velocity: 3 rows at once) and
+// transposed in chunks of four dofs (update of w: a chunk at once). For a pack a chunk is one dof,
+// and the columns serve both. Either way each number goes through the same operations in the same
+// order, so a lane of a pack has the bits of the plain scalar.
 //
 // In a pack the problem is the union of what its lanes need. A lane has `active` false for a
 // contact that is not its own, and columns of zeros for dofs that only other lanes share. Neither
@@ -60,6 +60,27 @@ STICKSLIP_INLINE Chunk<S> madd_chunk(const Chunk<S>& a, S b, const Chunk<S>& c) 
 }
 constexpr int round_up(int n, int k) { return (n + k - 1) / k * k; }
 
+/// A symmetric 3x3 matrix whose columns are needed.
+template <class S, bool kPlain = ScalarTraits<S>::kWidth == 1>
+struct Symmetric3 {
+  S xx, xy, xz, yy, yz, zz;
+  STICKSLIP_INLINE Row3<S> column(int r) const {
+    return r == 0 ? Row3<S>{xx, xy, xz} : r == 1 ? Row3<S>{xy, yy, yz} : Row3<S>{xz, yz, zz};
+  }
+};
+template <class S>
+struct Symmetric3<S, true> {
+  Row3<S> columns[3];
+  STICKSLIP_INLINE const Row3<S>& column(int r) const { return columns[r]; }
+};
+template <class S>
+STICKSLIP_INLINE Symmetric3<S> make_symmetric(S xx, S xy, S xz, S yy, S yz, S zz) {
+  if constexpr (ScalarTraits<S>::kWidth == 1)
+    return {{make_row3(xx, xy, xz), make_row3(xy, yy, yz), make_row3(xz, yz, zz)}};
+  else
+    return {xx, xy, xz, yy, yz, zz};
+}
+
 /// One contact of a factored problem. The owner fills the inputs; `prepare_contact` the rest.
 template <class S>
 struct FactoredContact {
@@ -78,20 +99,46 @@ struct FactoredContact {
   S velocity[3];  // v_i [m/s]
   // Derived.
   LocalContact<S> local;
-  S shared[6];  // Y Y^T
-  Row3<S> shared_columns[3];
-  Row3<S> inverse[3];  // columns of G_ii^-1 (from S^-1): the stick impulse is -G_ii^-1 c
-  Row3<S> base;        // c0 - (Y Y^T) lambda: velocity without own impulse is base + Y w
+  Row3<S> base;  // c0 - (Y Y^T) lambda: velocity without own impulse is base + Y w
   Row3<S> lambda;
-  S direction[2];  // unit direction of the last slip impulse, or zero
+  Symmetric3<S> inverse;  // G_ii^-1 (from S^-1): the stick impulse is -G_ii^-1 c
+  Symmetric3<S> shared;   // Y Y^T
+  S direction[2];         // unit direction of the last slip impulse, or zero
+  // Transposed rows of a plain scalar.
   int chunks;
   int* chunk_start;  // dof of a chunk's first lane
-  Chunk<S>* yt;  // (3, chunks): transposed rows, zero where a chunk reaches past the touched dofs
+  Chunk<S>* yt;      // (3, chunks), zero where a chunk reaches past the touched dofs
   // Newton step.
-  Chunk<S>* yn;          // (3, chunks): columns of Y^T N
+  bool moves;            // it takes part
   Row3<S> n_columns[3];  // N, eliminated response of the contact
   S n_offset[3];
+  Chunk<S>* yn;  // (3, chunks): columns of Y^T N
 };
+
+/// Chunks of the dofs that a contact touches; M = 6: all six dofs, else by index.
+template <int M, class S>
+STICKSLIP_INLINE int chunk_count(const FactoredContact<S>& c) {
+  if constexpr (M > 0)
+    return round_up(M, kChunk<S>) / kChunk<S>;
+  else
+    return ScalarTraits<S>::kWidth == 1 ? c.chunks : c.count;
+}
+/// The first dof of a chunk.
+template <int M, class S>
+STICKSLIP_INLINE int first_dof(const FactoredContact<S>& c, int chunk) {
+  if constexpr (M > 0)
+    return chunk * kChunk<S>;
+  else
+    return ScalarTraits<S>::kWidth == 1 ? c.chunk_start[chunk] : c.index[chunk];
+}
+/// Row r at the dofs of a chunk.
+template <int M, class S>
+STICKSLIP_INLINE const Chunk<S>& row_chunk(const FactoredContact<S>& c, int r, int chunk) {
+  if constexpr (ScalarTraits<S>::kWidth == 1)
+    return c.yt[r * chunk_count<M>(c) + chunk];
+  else
+    return r == 0 ? c.y[chunk].x : r == 1 ? c.y[chunk].y : c.y[chunk].z;
+}
 
 /// Sizes of a workspace: how many contacts and shared dofs it can hold.
 struct FactoredCapacity {
@@ -217,16 +264,16 @@ class FactoredProblem {
     odd_ = arena.take<bool>(m);
     for (int i = 0; i < n; ++i) {
       int* index = arena.take<int>(m);
-      int* start = arena.take<int>(m);
       Row3<S>* y = arena.take<Row3<S>>(m);
-      Chunk<S>* yt = arena.take<Chunk<S>>(3 * m);
       Chunk<S>* yn = arena.take<Chunk<S>>(3 * m);
+      int* start = kPlain ? arena.take<int>(m) : nullptr;
+      Chunk<S>* yt = kPlain ? arena.take<Chunk<S>>(3 * m) : nullptr;
       if (memory) {
         contacts_[i].index = index;
-        contacts_[i].chunk_start = start;
         contacts_[i].y = y;
-        contacts_[i].yt = yt;
         contacts_[i].yn = yn;
+        contacts_[i].chunk_start = start;
+        contacts_[i].yt = yt;
       }
     }
     if constexpr (!kIsDouble) {
@@ -237,7 +284,8 @@ class FactoredProblem {
     }
     return arena.used();
   }
-  static constexpr bool kIsDouble = ScalarTraits<S>::kWidth == 1 && sizeof(S) == 8;
+  static constexpr bool kPlain = ScalarTraits<S>::kWidth == 1;
+  static constexpr bool kIsDouble = kPlain && sizeof(S) == 8;
 
   FactoredContact<S>* contacts_ = nullptr;
   FactoredCapacity capacity_;
@@ -276,12 +324,13 @@ STICKSLIP_INLINE Row3<S> add_rows(const FactoredContact<S>& c, const S* w, const
 /// target += Y^T d.
 template <int M, class S>
 STICKSLIP_INLINE void add_transposed(const FactoredContact<S>& c, const S d[3], S* target) {
-  constexpr int kFixed = M == 6 ? round_up(6, kChunk<S>) / kChunk<S> : 0;
-  const int chunks = M == 6 ? kFixed : c.chunks;
+  const int chunks = chunk_count<M>(c);
+#pragma GCC unroll 6
   for (int j = 0; j < chunks; ++j) {
-    S* t = target + (M == 6 ? j * kChunk<S> : c.chunk_start[j]);
+    S* t = target + first_dof<M>(c, j);
     Chunk<S> v = load_chunk(t);
-    for (int r = 0; r < 3; ++r) v = madd_chunk<S>(c.yt[r * chunks + j], d[r], v);
+#pragma GCC unroll 3
+    for (int r = 0; r < 3; ++r) v = madd_chunk<S>(row_chunk<M>(c, r, j), d[r], v);
     store_chunk(t, v);
   }
 }
@@ -303,7 +352,7 @@ STICKSLIP_INLINE void contact_velocity(const FactoredContact<S>& c, const S* w, 
 template <class S>
 STICKSLIP_INLINE void update_base(FactoredContact<S>& c, const S l[3]) {
   Row3<S> x = make_row3(c.offset[0], c.offset[1], c.offset[2]);
-  for (int r = 0; r < 3; ++r) x = nmadd(c.shared_columns[r], l[r], x);
+  for (int r = 0; r < 3; ++r) x = nmadd(c.shared.column(r), l[r], x);
   c.base = x;
 }
 

@@ -54,7 +54,7 @@ STICKSLIP_INLINE void prepare(LocalContact<S>& k) {
   // sign, so a determinant counts only next to a trace.
   const auto some = tr > eps * trace;
   const auto full = some & (det > eps * tr * (k.xx + k.yy));
-  const S inv = select(full, one / select(full, det, one), one / select(some, tr * tr, one));
+  const S inv = one / select(full, det, select(some, tr * tr, one));
   const S inverse = select(full | some, inv, zero);
   k.ixx = select(full, k.syy, k.sxx) * inverse;
   k.ixy = select(full, -k.sxy, k.sxy) * inverse;

@@ -25,8 +25,17 @@ struct NewtonBlock {
   T g[3];  // out
 };
 
+/// Lanes where the contact is not both open and without an impulse; NaN counts.
+template <class S>
+STICKSLIP_INLINE Mask<S> may_move(S scale, const S l[3], S velocity) {
+  const S zero = constant<S>(0), size = abs(l[0]) + abs(l[1]) + abs(l[2]);
+  return !((madd(scale, l[2], -velocity) <= zero) & (size <= zero));
+}
+
+/// N and g of one contact. Where no lane in `live` slides, B is the identity and A is zero: the
+/// same numbers with a fifth of the work.
 template <class T>
-STICKSLIP_INLINE void eliminate(NewtonBlock<T>& b, T alpha) {
+STICKSLIP_INLINE void eliminate(NewtonBlock<T>& b, T alpha, Mask<T> live) {
   const T zero = constant<T>(0), one = constant<T>(1),
           tiny = constant<T>(sizeof(Value<T>) == 4 ? 1e-30 : 1e-200);
   const T s = madd(b.scale, b.lambda[2], -b.u[2]);
@@ -34,33 +43,34 @@ STICKSLIP_INLINE void eliminate(NewtonBlock<T>& b, T alpha) {
   const T norm = sqrt(madd(t0, t0, t1 * t1)), limit = b.mu * max(s, zero);
   const auto on = s > zero;
   const auto stick = norm <= limit;
-  const T inv = one / max(norm, tiny), e0 = t0 * inv, e1 = t1 * inv, ratio = min(limit * inv, one);
-  const T q00 = ratio * nmadd(e0, e0, one), q01 = -(ratio * (e0 * e1)),
-          q11 = ratio * nmadd(e1, e1, one);
-  const T m0 = b.mu * e0, m1 = b.mu * e1;
-  // B = [b00 b01 b02; b01 b11 b12; 0 0 1], A only in the tangential rows.
-  const T b00 = select(stick, one, q00), b01 = select(stick, zero, q01),
-          b11 = select(stick, one, q11);
-  const T b02 = select(stick, zero, m0), b12 = select(stick, zero, m1);
-  const T f0 = select(stick, b.u[0], nmadd(limit, e0, b.scale * b.lambda[0]));
-  const T f1 = select(stick, b.u[1], nmadd(limit, e1, b.scale * b.lambda[1]));
-  const T f2 = b.u[2];
   const T prox = alpha * b.scale, *p = b.block;
   const T dxx = p[0] + prox, dyy = p[3] + prox, dzz = p[5] + prox;
-  // C = A + B D.
-  const T c00 =
-      madd(b00, dxx, madd(b01, p[1], madd(b02, p[2], select(stick, zero, (one - q00) * b.scale))));
-  const T c01 =
-      madd(b00, p[1], madd(b01, dyy, madd(b02, p[4], select(stick, zero, -(q01 * b.scale)))));
-  const T c02 =
-      madd(b00, p[2], madd(b01, p[4], madd(b02, dzz, select(stick, zero, -(m0 * b.scale)))));
-  const T c10 =
-      madd(b01, dxx, madd(b11, p[1], madd(b12, p[2], select(stick, zero, -(q01 * b.scale)))));
-  const T c11 =
-      madd(b01, p[1], madd(b11, dyy, madd(b12, p[4], select(stick, zero, (one - q11) * b.scale))));
-  const T c12 =
-      madd(b01, p[2], madd(b11, p[4], madd(b12, dzz, select(stick, zero, -(m1 * b.scale)))));
+  // F, and C = A + B D.
+  T f0 = b.u[0], f1 = b.u[1];
+  const T f2 = b.u[2];
+  T c00 = dxx, c01 = p[1], c02 = p[2], c10 = p[1], c11 = dyy, c12 = p[4];
   const T c20 = p[2], c21 = p[4], c22 = dzz;
+  const bool slides = any(live & on & !stick);
+  T b00, b01, b11, b02, b12;
+  if (slides) {
+    const T inv = one / max(norm, tiny), e0 = t0 * inv, e1 = t1 * inv,
+            ratio = min(limit * inv, one);
+    const T q00 = ratio * nmadd(e0, e0, one), q01 = -(ratio * (e0 * e1)),
+            q11 = ratio * nmadd(e1, e1, one);
+    const T m0 = b.mu * e0, m1 = b.mu * e1;
+    // B = [b00 b01 b02; b01 b11 b12; 0 0 1], A only in the tangential rows.
+    b00 = select(stick, one, q00), b01 = select(stick, zero, q01), b11 = select(stick, one, q11);
+    b02 = select(stick, zero, m0), b12 = select(stick, zero, m1);
+    f0 = select(stick, b.u[0], nmadd(limit, e0, b.scale * b.lambda[0]));
+    f1 = select(stick, b.u[1], nmadd(limit, e1, b.scale * b.lambda[1]));
+    const auto a = [&](T slip) { return select(stick, zero, slip); };
+    c00 = madd(b00, dxx, madd(b01, p[1], madd(b02, p[2], a((one - q00) * b.scale))));
+    c01 = madd(b00, p[1], madd(b01, dyy, madd(b02, p[4], a(-(q01 * b.scale)))));
+    c02 = madd(b00, p[2], madd(b01, p[4], madd(b02, dzz, a(-(m0 * b.scale)))));
+    c10 = madd(b01, dxx, madd(b11, p[1], madd(b12, p[2], a(-(q01 * b.scale)))));
+    c11 = madd(b01, p[1], madd(b11, dyy, madd(b12, p[4], a((one - q11) * b.scale))));
+    c12 = madd(b01, p[2], madd(b11, p[4], madd(b12, dzz, a(-(m1 * b.scale)))));
+  }
   // Inverse by cofactors.
   const T j00 = nmadd(c12, c21, c11 * c22), j01 = nmadd(c01, c22, c02 * c21),
           j02 = nmadd(c02, c11, c01 * c12);
@@ -75,82 +85,91 @@ STICKSLIP_INLINE void eliminate(NewtonBlock<T>& b, T alpha) {
   for (int i = 0; i < 3; ++i) {
     const T *j = rows[i], g = madd(j[0], f0, madd(j[1], f1, j[2] * f2));
     b.g[i] = select(on, g, b.lambda[i]);
-    b.n[3 * i] = madd(j[0], b00, j[1] * b01);
-    b.n[3 * i + 1] = madd(j[0], b01, j[1] * b11);
-    b.n[3 * i + 2] = madd(j[0], b02, madd(j[1], b12, j[2]));
+    b.n[3 * i] = j[0];
+    b.n[3 * i + 1] = j[1];
+    b.n[3 * i + 2] = j[2];
+    if (slides) {
+      b.n[3 * i] = madd(j[0], b00, j[1] * b01);
+      b.n[3 * i + 1] = madd(j[0], b01, j[1] * b11);
+      b.n[3 * i + 2] = madd(j[0], b02, madd(j[1], b12, j[2]));
+    }
   }
 }
 
-/// Elimination of all contacts, four at a time for a plain scalar: each contact's numbers are the
-/// same either way. `center`: proximal center (n, 3), or null where it is the present impulse.
+/// Columns of Y^T N of one contact over its shared dofs, by chunks.
 template <int M, class S>
-STICKSLIP_STAGE void eliminate_contacts(FactoredProblem<S>& p, S alpha, const S* center) {
-  constexpr int kLanes = ScalarTraits<S>::kWidth == 1 ? 4 : 1;
+STICKSLIP_INLINE void respond(FactoredContact<S>& c) {
+  const int chunks = chunk_count<M>(c);
+  for (int r = 0; r < 3; ++r) {
+    S n[3];
+    store(c.n_columns[r], n);
+    for (int j = 0; j < chunks; ++j) {
+      Chunk<S> x = row_chunk<M>(c, 0, j) * Chunk<S>(n[0]);
+      x = madd_chunk<S>(row_chunk<M>(c, 1, j), n[1], x);
+      c.yn[r * chunks + j] = madd_chunk<S>(row_chunk<M>(c, 2, j), n[2], x);
+    }
+  }
+}
+
+/// Elimination of all contacts, Y^T N, and -sum Y^T g into p.scratch. Four contacts at a time for a
+/// plain scalar: each contact's numbers are the same either way. `center`: proximal center (n, 3),
+/// or null where it is the present impulse. A contact that is open without an impulse in every
+/// live lane brings nothing, and is left out of a pack's step.
+template <int M, class S>
+STICKSLIP_STAGE void eliminate_contacts(FactoredProblem<S>& p, Mask<S> live, S alpha,
+                                        const S* center) {
+  constexpr bool kPlain = ScalarTraits<S>::kWidth == 1;
+  constexpr int kLanes = kPlain ? 4 : 1;
   using T = Chunk<S>;
   const int n = p.size();
+  S* rhs = p.scratch;
+  for (int i = 0; i < p.stride(); ++i) rhs[i] = constant<S>(0);
   for (int first = 0; first < n; first += kLanes) {
     NewtonBlock<T> b;
     for (int l = 0; l < kLanes; ++l) {
       const int i = first + l < n ? first + l : first;  // the last pack is filled with copies
-      const FactoredContact<S>& c = p.contact(i);
+      FactoredContact<S>& c = p.contact(i);
       S v[3], lambda[3];
       contact_velocity<M>(c, p.w, v);
       store(c.lambda, lambda);
       if (center)
         for (int r = 0; r < 3; ++r)
           v[r] = madd(alpha * c.local.scale, lambda[r] - center[3 * i + r], v[r]);
+      c.moves = kPlain || any(live & may_move(c.local.scale, lambda, v[2]));
       S* out = reinterpret_cast<S*>(&b) + l;
       for (int r = 0; r < 6; ++r) out[r * kLanes] = c.private_block[r];
       out[6 * kLanes] = c.local.mu;
       out[7 * kLanes] = c.local.scale;
       for (int r = 0; r < 3; ++r) out[(8 + r) * kLanes] = lambda[r], out[(11 + r) * kLanes] = v[r];
     }
-    eliminate(b, T(alpha));
+    if (!kPlain && !p.contact(first).moves) continue;
+    if constexpr (kPlain)
+      eliminate(b, T(alpha), T(alpha) >= T(alpha));
+    else
+      eliminate(b, alpha, live);
     for (int l = 0; l < kLanes && first + l < n; ++l) {
       FactoredContact<S>& c = p.contact(first + l);
       const S* out = reinterpret_cast<const S*>(&b) + l;
       const auto at = [out](int r) { return out[r * kLanes]; };
       for (int j = 0; j < 3; ++j) c.n_columns[j] = make_row3(at(14 + j), at(17 + j), at(20 + j));
       for (int r = 0; r < 3; ++r) c.n_offset[r] = at(23 + r);
+      respond<M>(c);
+      const S minus[3] = {-c.n_offset[0], -c.n_offset[1], -c.n_offset[2]};
+      add_transposed<M>(c, minus, rhs);
     }
   }
 }
 
-/// Columns of Y^T N of one contact over its shared dofs, in the layout of `yt`.
-template <int M, class S>
-STICKSLIP_INLINE void respond(FactoredContact<S>& c) {
-  const int chunks = M ? round_up(M, kChunk<S>) / kChunk<S> : c.chunks;
-  for (int r = 0; r < 3; ++r) {
-    S n[3];
-    store(c.n_columns[r], n);
-    for (int j = 0; j < chunks; ++j) {
-      Chunk<S> x = c.yt[j] * Chunk<S>(n[0]);
-      x = madd_chunk<S>(c.yt[chunks + j], n[1], x);
-      c.yn[r * chunks + j] = madd_chunk<S>(c.yt[2 * chunks + j], n[2], x);
-    }
-  }
-}
-
-/// -sum Y^T g into `rhs`.
-template <int M, class S>
-STICKSLIP_INLINE void gather_right_side(FactoredProblem<S>& p, S* rhs) {
-  for (int i = 0; i < p.stride(); ++i) rhs[i] = constant<S>(0);
-  for (int i = 0; i < p.size(); ++i) {
-    const FactoredContact<S>& c = p.contact(i);
-    const S minus[3] = {-c.n_offset[0], -c.n_offset[1], -c.n_offset[2]};
-    add_transposed<M>(c, minus, rhs);
-  }
-}
-
-/// Solves (I + sum Y^T N Y) x = -sum Y^T g; x lies in p.scratch. Elimination without pivoting: a
-/// breakdown shows as a huge or non-finite x, which the caller rejects. This one keeps the matrix
-/// in registers, row by row in chunks.
+/// Solves (I + sum Y^T N Y) x = -sum Y^T g, the right-hand side in p.scratch, x too. Elimination
+/// without pivoting: a breakdown shows as a huge or non-finite x, which the caller rejects. This
+/// one keeps the matrix in registers, row by row in chunks.
 template <int M, class S>
 STICKSLIP_STAGE S* solve_fixed(FactoredProblem<S>& p) {
+  constexpr bool kPlain = ScalarTraits<S>::kWidth == 1;
   constexpr int K = kChunk<S>, kColumns = round_up(M, K) / K, kAll = round_up(M + 1, K) / K;
+  constexpr int kGroup = kPlain ? 1 : 3;  // columns summed at once
   const S zero = constant<S>(0), one = constant<S>(1), tiny = constant<S>(1e-30);
   S* x = p.scratch;
-  gather_right_side<M>(p, x);
   Chunk<S> row[M][kAll];
   const auto at = [](const Chunk<S>* r, int k) {
     if constexpr (K > 1)
@@ -165,24 +184,33 @@ STICKSLIP_STAGE S* solve_fixed(FactoredProblem<S>& p) {
       r[k] = v;
   };
 #pragma GCC unroll 8
-  for (int q = 0; q < kColumns; ++q) {
-    Chunk<S> sum[M];
+  for (int first = 0; first < kColumns; first += kGroup) {
+    Chunk<S> sum[M][kGroup];
 #pragma GCC unroll 8
     for (int i = 0; i < M; ++i) {
-      sum[i] = Chunk<S>(zero);
-      if (i / K == q) put(sum + i, i % K, one);
+#pragma GCC unroll 3
+      for (int q = 0; q < kGroup; ++q) {
+        sum[i][q] = Chunk<S>(zero);
+        if (i / K == first + q) put(&sum[i][q], i % K, one);
+      }
     }
     for (int k = 0; k < p.size(); ++k) {
       const FactoredContact<S>& c = p.contact(k);
+      if (!kPlain && !c.moves) continue;
 #pragma GCC unroll 3
       for (int r = 0; r < 3; ++r) {
         const S* t = reinterpret_cast<const S*>(c.yn + r * kColumns);
 #pragma GCC unroll 8
-        for (int i = 0; i < M; ++i) sum[i] = madd_chunk<S>(c.yt[r * kColumns + q], t[i], sum[i]);
+        for (int i = 0; i < M; ++i)
+#pragma GCC unroll 3
+          for (int q = 0; q < kGroup; ++q)
+            sum[i][q] = madd_chunk<S>(row_chunk<M>(c, r, first + q), t[i], sum[i][q]);
       }
     }
 #pragma GCC unroll 8
-    for (int i = 0; i < M; ++i) row[i][q] = sum[i];
+    for (int i = 0; i < M; ++i)
+#pragma GCC unroll 3
+      for (int q = 0; q < kGroup; ++q) row[i][first + q] = sum[i][q];
   }
 #pragma GCC unroll 8
   for (int i = 0; i < M; ++i) {
@@ -197,8 +225,9 @@ STICKSLIP_STAGE S* solve_fixed(FactoredProblem<S>& p) {
 #pragma GCC unroll 8
     for (int i = j + 1; i < M; ++i) {
       const S f = -(at(row[i], j) * inverse[j]);
+      // What lies left of the diagonal is not used again.
 #pragma GCC unroll 8
-      for (int q = j / K; q < kAll; ++q) row[i][q] = madd_chunk<S>(row[j][q], f, row[i][q]);
+      for (int q = (j + 1) / K; q < kAll; ++q) row[i][q] = madd_chunk<S>(row[j][q], f, row[i][q]);
     }
   }
   S y[M];
@@ -221,21 +250,22 @@ STICKSLIP_STAGE S* solve_any(FactoredProblem<S>& p) {
   const S zero = constant<S>(0), one = constant<S>(1), tiny = constant<S>(1e-30);
   const int m = p.dofs(), stride = p.stride();
   S *h = p.matrix, *x = p.scratch;
-  gather_right_side<0>(p, x);
   for (int i = 0; i < m * stride; ++i) h[i] = zero;
   for (int i = 0; i < m; ++i) h[i * stride + i] = one;
   for (int i = 0; i < p.size(); ++i) {
     const FactoredContact<S>& c = p.contact(i);
-    for (int j = 0, k = 0; j < c.chunks; ++j)
-      for (; k < c.count && c.index[k] < c.chunk_start[j] + K; ++k) {
-        const int lane = c.index[k] - c.chunk_start[j];
+    if (!c.moves) continue;
+    const int chunks = chunk_count<0>(c);
+    for (int j = 0, k = 0; j < chunks; ++j)
+      for (; k < c.count && c.index[k] < first_dof<0>(c, j) + K; ++k) {
+        const int lane = c.index[k] - first_dof<0>(c, j);
         S t[3];
-        for (int r = 0; r < 3; ++r)
-          t[r] = reinterpret_cast<const S*>(c.yn + r * c.chunks + j)[lane];
-        for (int q = 0; q < c.chunks; ++q) {
-          S* to = h + c.index[k] * stride + c.chunk_start[q];
+        for (int r = 0; r < 3; ++r) t[r] = reinterpret_cast<const S*>(c.yn + r * chunks + j)[lane];
+        S* row = h + c.index[k] * stride;
+        for (int q = 0; q < chunks; ++q) {
+          S* to = row + first_dof<0>(c, q);
           Chunk<S> v = load_chunk(to);
-          for (int r = 0; r < 3; ++r) v = madd_chunk<S>(c.yt[r * c.chunks + q], t[r], v);
+          for (int r = 0; r < 3; ++r) v = madd_chunk<S>(row_chunk<0>(c, r, q), t[r], v);
           store_chunk(to, v);
         }
       }
@@ -247,7 +277,7 @@ STICKSLIP_STAGE S* solve_any(FactoredProblem<S>& p) {
     for (int i = j + 1; i < m; ++i) {
       S* row = h + i * stride;
       const S f = -(row[j] * inv);
-      for (int k = j / K * K; k <= m; k += K)
+      for (int k = (j + 1) / K * K; k <= m; k += K)
         store_chunk(row + k, madd_chunk<S>(load_chunk(pivot + k), f, load_chunk(row + k)));
     }
     h[j * stride + j] = inv;
@@ -262,7 +292,6 @@ STICKSLIP_STAGE S* solve_any(FactoredProblem<S>& p) {
 
 template <int M, class S>
 STICKSLIP_INLINE S* solve_shared(FactoredProblem<S>& p) {
-  for (int i = 0; i < p.size(); ++i) respond<M>(p.contact(i));
   if constexpr (M > 0)
     return solve_fixed<M>(p);
   else
@@ -275,7 +304,7 @@ STICKSLIP_INLINE S* solve_shared(FactoredProblem<S>& p) {
 template <int M, class S>
 STICKSLIP_STAGE void newton_step(FactoredProblem<S>& p, Mask<S> live, S alpha) {
   const S zero = constant<S>(0), one = constant<S>(1), huge = constant<S>(1e6);
-  eliminate_contacts<M>(p, alpha, static_cast<const S*>(nullptr));
+  eliminate_contacts<M>(p, live, alpha, static_cast<const S*>(nullptr));
   const S* x = solve_shared<M>(p);
   S size = zero;
   for (int k = 0; k < (M ? M : p.dofs()); ++k) size = size + abs(x[k]);
@@ -283,6 +312,10 @@ STICKSLIP_STAGE void newton_step(FactoredProblem<S>& p, Mask<S> live, S alpha) {
   const Row3<S> none = make_row3(zero, zero, zero);
   for (int i = 0; i < p.size(); ++i) {
     FactoredContact<S>& c = p.contact(i);
+    if (!c.moves) {
+      for (S& e : c.direction) e = select(sane, zero, e);
+      continue;
+    }
     S dv[3], response[3], old[3], l[3];
     store(add_rows<M>(c, x, none), dv);
     store(madd(c.n_columns[2], dv[2], madd(c.n_columns[1], dv[1], c.n_columns[0] * dv[0])),

@@ -13,18 +13,11 @@
 
 namespace stickslip::contact::inline STICKSLIP_KERNELS {
 
-/// Transposed rows in chunks, from the rows.
+/// Transposed rows in chunks, from the rows; a pack needs none.
 template <int M, class S>
 STICKSLIP_INLINE void transpose_rows(FactoredContact<S>& c) {
   if constexpr (ScalarTraits<S>::kWidth > 1) {
-    const int n = M == 6 ? 6 : c.count;
-    c.chunks = n;
-    for (int k = 0; k < n; ++k) {
-      c.chunk_start[k] = M == 6 ? k : c.index[k];
-      c.yt[k] = c.y[k].x;
-      c.yt[n + k] = c.y[k].y;
-      c.yt[2 * n + k] = c.y[k].z;
-    }
+    return;
   } else if constexpr (M == 6) {
     using V = typename Chunk<S>::Vector;
     c.chunks = 2;
@@ -82,28 +75,42 @@ STICKSLIP_INLINE void clear_inactive(FactoredContact<S>& c) {
   c.friction = select(c.active, c.friction, zero);
 }
 
+/// Y Y^T.
+template <int M, class S>
+STICKSLIP_INLINE Symmetric3<S> gram(const FactoredContact<S>& c) {
+  const S zero = constant<S>(0);
+  const int n = M == 6 ? 6 : c.count;
+  if constexpr (ScalarTraits<S>::kWidth == 1) {
+    Row3<S> d[3];
+    for (int r = 0; r < 3; ++r) d[r] = make_row3(zero, zero, zero);
+    for (int k = 0; k < n; ++k) {
+      S y[3];
+      store(c.y[k], y);
+      for (int r = 0; r < 3; ++r) d[r] = madd(c.y[k], y[r], d[r]);
+    }
+    return {{d[0], d[1], d[2]}};
+  } else {
+    Symmetric3<S> g = {zero, zero, zero, zero, zero, zero};
+    for (int k = 0; k < n; ++k) {
+      const Row3<S>& y = c.y[k];
+      g.xx = madd(y.x, y.x, g.xx), g.xy = madd(y.x, y.y, g.xy), g.xz = madd(y.x, y.z, g.xz);
+      g.yy = madd(y.y, y.y, g.yy), g.yz = madd(y.y, y.z, g.yz), g.zz = madd(y.z, y.z, g.zz);
+    }
+    return g;
+  }
+}
+
 /// Blocks of one contact from its rows, and its warm start (brought back into the cone).
 template <int M, class S>
 STICKSLIP_STAGE void prepare_contact(FactoredContact<S>& c) {
   const S zero = constant<S>(0), one = constant<S>(1);
   clear_inactive<M>(c);
   transpose_rows<M>(c);
-  const int n = M == 6 ? 6 : c.count;
-  Row3<S> d[3];
-  for (int r = 0; r < 3; ++r) d[r] = make_row3(zero, zero, zero);
-  for (int k = 0; k < n; ++k) {
-    S y[3];
-    store(c.y[k], y);
-    for (int r = 0; r < 3; ++r) d[r] = madd(c.y[k], y[r], d[r]);
-  }
+  c.shared = gram<M>(c);
   S column[3][3];
-  for (int r = 0; r < 3; ++r) {
-    c.shared_columns[r] = d[r];
-    store(d[r], column[r]);
-  }
+  for (int r = 0; r < 3; ++r) store(c.shared.column(r), column[r]);
   const S shared[6] = {column[0][0], column[0][1], column[0][2],
                        column[1][1], column[1][2], column[2][2]};
-  for (int i = 0; i < 6; ++i) c.shared[i] = shared[i];
   LocalContact<S>& k = c.local;
   const S* p = c.private_block;
   k.xx = shared[0] + p[0], k.xy = shared[1] + p[1], k.xz = shared[2] + p[2];
@@ -113,9 +120,8 @@ STICKSLIP_STAGE void prepare_contact(FactoredContact<S>& c) {
   // G^-1 = [S^-1, -S^-1 w; ., 1/G_zz + w^T S^-1 w]: one product of columns on the latency chain of
   // a sticking visit.
   const S ux = madd(k.ixx, k.wx, k.ixy * k.wy), uy = madd(k.ixy, k.wx, k.iyy * k.wy);
-  c.inverse[0] = make_row3(k.ixx, k.ixy, -ux);
-  c.inverse[1] = make_row3(k.ixy, k.iyy, -uy);
-  c.inverse[2] = make_row3(-ux, -uy, madd(k.wx, ux, madd(k.wy, uy, k.inv_zz)));
+  c.inverse =
+      make_symmetric(k.ixx, k.ixy, -ux, k.iyy, -uy, madd(k.wx, ux, madd(k.wy, uy, k.inv_zz)));
   // Warm start.
   S* l = c.impulse;
   l[2] = max(l[2], zero);
@@ -144,9 +150,9 @@ STICKSLIP_INLINE S visit(FactoredContact<S>& c, S* w, Mask<S> live, S speed) {
   if (!any(live & (closing | (old[2] > zero)))) return zero;
   S next[3];
   if (any(closing)) {
-    Row3<S> stop = c.inverse[0] * v[0];
-    stop = madd(c.inverse[1], v[1], stop);
-    stop = madd(c.inverse[2], v[2], stop);
+    Row3<S> stop = c.inverse.column(0) * v[0];
+    stop = madd(c.inverse.column(1), v[1], stop);
+    stop = madd(c.inverse.column(2), v[2], stop);
     store(stop, next);
     for (int r = 0; r < 3; ++r) next[r] = -next[r];
     Reduced<S> r;
@@ -181,8 +187,12 @@ STICKSLIP_INLINE S visit(FactoredContact<S>& c, S* w, Mask<S> live, S speed) {
 template <int M, bool kMaxDissipation, class S>
 STICKSLIP_STAGE S sweep(FactoredProblem<S>& p, Mask<S> live, S speed) {
   S change = constant<S>(0);
-  for (int i = 0; i < p.size(); ++i)
-    change = max(change, visit<M, kMaxDissipation>(p.contact(i), p.w, live, speed));
+  for (int i = 0; i < p.size(); ++i) {
+    FactoredContact<S>& c = p.contact(i);
+    // A slot that no live lane uses.
+    if (ScalarTraits<S>::kWidth > 1 && !any(live & c.active)) continue;
+    change = max(change, visit<M, kMaxDissipation>(c, p.w, live, speed));
+  }
   return change;
 }
 

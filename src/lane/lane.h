@@ -67,10 +67,9 @@ template <class S>
 STICKSLIP_INLINE S nmadd(S a, S b, S c) {  // c - a * b, fused
   return madd(-a, b, c);
 }
-template <class S>
-STICKSLIP_INLINE S abs(S a) {
-  return select(a < S(Value<S>(0)), -a, a);
-}
+// Clears the sign, also of zero.
+STICKSLIP_INLINE double abs(double a) { return __builtin_fabs(a); }
+STICKSLIP_INLINE float abs(float a) { return __builtin_fabsf(a); }
 template <class S>
 STICKSLIP_INLINE S min(S a, S b) {
   return select(b < a, b, a);

@@ -50,7 +50,8 @@ STICKSLIP_INLINE void load_rows(const Value<S>* rows, int n, S* out) {
     constexpr int W = ScalarTraits<S>::kWidth;
     for (int first = 0; first < n; first += W) {
       S block[W];
-      for (int i = 0; i < W; ++i) __builtin_memcpy(&block[i], rows + long(i) * n + first, sizeof(S));
+      for (int i = 0; i < W; ++i)
+        __builtin_memcpy(&block[i], rows + long(i) * n + first, sizeof(S));
       transpose_block(block);
       const int count = n - first < W ? n - first : W;
       for (int k = 0; k < count; ++k) out[first + k] = block[k];

@@ -1,5 +1,6 @@
 // Drives of the joints, forces of the user, and how a velocity moves a configuration.
 #pragma once
+#include "dynamics/link.h"
 #include "lane/math.h"
 #include "step/robot_lanes.h"
 
@@ -72,23 +73,17 @@ Spatial<S> base_control(const RobotLanes<S>& robot) {
   return {{f[3], f[4], f[5]}, {f[0], f[1], f[2]}};
 }
 
-/// A wrench at the center of mass of a body as a force at the base origin.
-template <class S>
-STICKSLIP_INLINE Spatial<S> at_reference(const Spatial<S>& wrench, const RigidInertia<S>& body) {
-  const auto heavy = body.mass > constant<S>(0);
-  const S inverse = constant<S>(1) / select(heavy, body.mass, constant<S>(1));
-  return {cross(body.h * inverse, wrench.lin, wrench.ang), wrench.lin};
-}
-
 /// Adds the users' wrenches to the forces on base and links.
 template <class S>
 void add_wrenches(RobotLanes<S>& robot) {
   if (!robot.control.wrenches) return;
   dynamics::Tree<S>& t = *robot.tree;
-  t.base.force = t.base.force + at_reference(*robot.control.base_wrench, t.base.inertia);
+  t.base.force =
+      t.base.force + dynamics::force_of_wrench(*robot.control.base_wrench, t.base.inertia);
   for (int slot = 0; slot < t.num_slots; ++slot)
     t.links[slot].force =
-        t.links[slot].force + at_reference(robot.control.wrenches[slot], t.links[slot].inertia);
+        t.links[slot].force +
+        dynamics::force_of_wrench(robot.control.wrenches[slot], t.links[slot].inertia);
 }
 
 }  // namespace stickslip::step::inline STICKSLIP_KERNELS

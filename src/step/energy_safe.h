@@ -13,7 +13,7 @@
 // others go on; one whose kick was short enough goes through the same kick again, with the same
 // bits, while others shorten theirs.
 #pragma once
-#include "dynamics/bias.h"
+#include "dynamics/dynamics.h"
 #include "step/control.h"
 #include "step/stage_timer.h"
 
@@ -44,6 +44,7 @@ class EnergySafeStep {
     while (any(live)) {
       const S h = kick(left, shortest, live);
       fail(live, failed, live & !kick_finite_);
+      record_contacts(robot_, live);
       left = select(live, left - h, left);
       Invariants invariants = take_invariants();
       drift(h, invariants, live);
@@ -102,8 +103,7 @@ class EnergySafeStep {
     const Mask<S> fresh = state().fresh;
     if (!any(fresh)) return;
     state().fresh = none<S>();
-    dynamics::compute_velocities(t_, robot_.angular(u()), u() + offset_);
-    dynamics::multiply_lower(t_, robot_.linear(u()), u() + offset_);
+    multiply_lower(u());
     const S kinetic = kinetic_energy(u());
     drift_acceleration(u(), number(0.5) * h, kinetic, robot_.delta);
     copy_where(fresh, robot_.delta, nu_, state().drift_acceleration);
@@ -123,16 +123,22 @@ class EnergySafeStep {
   /// Fixed base: accelerations by gravity alone, at q.
   void gravity_acceleration() {
     for (int k = 0; k < nu_; ++k) robot_.rates[k] = number(0);
-    dynamics::compute_bias<S>(t_, zero3<S>(), robot_.rates, robot_.control.gravity);
-    dynamics::solve_lower_transposed<S>(t_, nullptr, dynamics::LinkForces::kAll);
+    dynamics::solve_bias(t_, zero3<S>(), robot_.rates, robot_.control.gravity);
     solve_lower(robot_.gravity_acceleration);
   }
 
-  /// L^-1 x of the tree as a velocity of the robot (nu).
-  void solve_lower(S* out) {
+  /// L^-1 x of the tree as a velocity of the robot (nu); returns |x|^2.
+  S solve_lower(S* out) {
     S base[6];
-    dynamics::solve_lower(t_, base, out + offset_);
+    const S square = dynamics::solve_lower(t_, base, out + offset_);
     for (int k = 0; k < offset_; ++k) out[k] = base[k];
+    return square;
+  }
+
+  /// Link velocities, and x = L velocity.
+  void multiply_lower(const S* velocity) {
+    dynamics::multiply_lower(t_, robot_.angular(velocity), robot_.linear(velocity),
+                             velocity + offset_);
   }
 
   /// Kinetic energy of the velocity whose L-space coordinates the tree holds; the implicit diagonal
@@ -198,8 +204,7 @@ class EnergySafeStep {
       solve_lower(robot_.delta);
       for (int k = 0; k < nu_; ++k) free[k] = madd(h, robot_.delta[k], free[k]);
     }
-    dynamics::compute_velocities(t_, robot_.angular(free), free + offset_);
-    dynamics::multiply_lower(t_, robot_.linear(free), free + offset_);
+    multiply_lower(free);
     timer_.end(kDynamics);
   }
 
@@ -294,11 +299,13 @@ class EnergySafeStep {
   /// -M^-1 C at (q, velocity) into `out`, scaled so that a kick of it over `time` stays below
   /// kDriftLimit of the speed that the kinetic energy stands for.
   void drift_acceleration(const S* velocity, S time, S kinetic, S* out) {
-    dynamics::compute_bias<S>(t_, robot_.angular(velocity), velocity + offset_, zero3<S>());
-    dynamics::solve_lower_transposed<S>(t_, nullptr, dynamics::LinkForces::kAll);
-    const S size = time * sqrt(dynamics::squared_norm(t_));
+    dynamics::solve_bias(t_, robot_.angular(velocity), velocity + offset_, zero3<S>());
+    finish_drift_acceleration(time, kinetic, out);
+  }
+  /// The same from L^-T (-C) in the tree's x.
+  void finish_drift_acceleration(S time, S kinetic, S* out) {
+    const S size = time * sqrt(solve_lower(out));
     const S limit = number(kDriftLimit) * sqrt(number(2) * kinetic);
-    solve_lower(out);
     const Mask<S> within = size <= limit;
     if (all(within)) return;
     const S factor = select(within, number(1), limit / select(within, number(1), size));
@@ -349,11 +356,12 @@ class EnergySafeStep {
   /// Second half kick of the drift and projection on its invariants. `next`: length of the step to
   /// come.
   void arrive(S h, S next, const Invariants& invariants, Mask<S> live) {
-    dynamics::compute_inertias(t_);
-    factor(next);
     const S half = number(0.5) * h, *w = robot_.u_free;
     S *a1 = robot_.delta, *u_new = robot_.u_new;
-    drift_acceleration(w, half, invariants.kinetic, a1);
+    dynamics::factor_and_solve_bias(t_, implicit_diagonal(robot_, next), robot_.angular(w),
+                                    w + offset_, zero3<S>());
+    robot_.prepared_step = next;
+    finish_drift_acceleration(half, invariants.kinetic, a1);
     copy_where(live, a1, nu_, state().drift_acceleration);
     for (int k = 0; k < nu_; ++k) u_new[k] = madd(half, a1[k], w[k]);
     project(h, invariants, u_new);
@@ -369,8 +377,7 @@ class EnergySafeStep {
 
   /// Gives u the momentum and energy of the invariants: docs/theory/step.md (S9)-(S12).
   void project(S h, const Invariants& v, S* u_new) {
-    dynamics::compute_velocities(t_, robot_.angular(u_new), u_new + offset_);
-    dynamics::multiply_lower(t_, robot_.linear(u_new), u_new + offset_);
+    multiply_lower(u_new);
     const S kinetic = kinetic_energy(u_new);
     if (!offset_) {
       scale_relative(v.kinetic + v.lifted - v.given, kinetic, v.kinetic, zero_spatial<S>(), u_new);
@@ -455,6 +462,7 @@ void step_energy_safe(RobotLanes<S>& robot, const StepSettings& settings) {
   copy_state_where(t, failed, backup, s);
   robot.prepared_step = select(failed, zero, robot.prepared_step);
   robot.contacts.forget(failed);
+  record_contacts(robot, failed, true);
   robot.info.non_finite = failed;
   robot.info.unconverged = robot.info.unconverged & !failed;
   robot.info.residual = select(failed, zero, robot.info.residual);

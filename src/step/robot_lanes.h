@@ -44,6 +44,14 @@ struct LaneInfo {
   int substeps = 1;
 };
 
+/// Contacts of each lane's last substep, per support point. A lane that is through while others
+/// take more substeps keeps its own.
+template <class S>
+struct LaneContacts {
+  S* impulse = nullptr;  // (points, 3) [N s]
+  Mask<S>* active = nullptr;
+};
+
 template <class S>
 struct RobotLanes {
   const RobotTables* tables;
@@ -52,6 +60,7 @@ struct RobotLanes {
   LaneControl<S> control;
   LaneInfo<S> info;
   ContactStage<S> contacts;
+  LaneContacts<S> last_contacts;  // empty: not kept (a world's list is that of its only lane)
   // Workspace of the integrators.
   S *q_new, *q_moved, *u_free, *u_plus, *u_new, *rates, *implicit, *force, *delta,
       *gravity_acceleration, *start_impulse;
@@ -106,6 +115,28 @@ STICKSLIP_INLINE void copy_state_where(const RobotTables& t, Mask<S> m, const La
   copy_where(m, from.drift_acceleration, t.nu, to.drift_acceleration);
   to.pending_gravity = select(m, from.pending_gravity, to.pending_gravity);
   to.fresh = (m & from.fresh) | ((!m) & to.fresh);
+}
+
+/// Notes the contacts of the list, or with `cleared` none, for these lanes.
+template <class S>
+void record_contacts(RobotLanes<S>& robot, Mask<S> lanes, bool cleared = false) {
+  const LaneContacts<S>& last = robot.last_contacts;
+  if (!last.impulse) return;
+  const S zero = constant<S>(0);
+  for (int k = 0; k < robot.tables->num_points; ++k) {
+    last.active[k] = last.active[k] & !lanes;
+    for (int r = 0; r < 3; ++r)
+      last.impulse[3 * k + r] = select(lanes, zero, last.impulse[3 * k + r]);
+  }
+  for (int i = 0; i < robot.contacts.count() && !cleared; ++i) {
+    const ActiveContact<S>& a = robot.contacts.active(i);
+    const Mask<S> here = lanes & a.active;
+    last.active[a.id] = last.active[a.id] | here;
+    for (int r = 0; r < 3; ++r) {
+      S& impulse = last.impulse[3 * a.id + r];
+      impulse = select(here, robot.contacts.impulse(i)[r], impulse);
+    }
+  }
 }
 
 }  // namespace stickslip::step::inline STICKSLIP_KERNELS

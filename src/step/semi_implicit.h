@@ -5,7 +5,7 @@
 // Where we differ: damping and PD control are implicit in the rates; M is never inverted nor
 // formed (docs/theory/step.md (S1), (S2)).
 #pragma once
-#include "dynamics/bias.h"
+#include "dynamics/dynamics.h"
 #include "step/control.h"
 #include "step/stage_timer.h"
 
@@ -17,6 +17,30 @@ STICKSLIP_INLINE void scale_x(dynamics::Tree<S>& t, double dt) {
   for (S& x : t.base.x) x = x * constant<S>(dt);
   for (int slot = 0; slot < t.num_slots; ++slot)
     t.links[slot].x = t.links[slot].x * constant<dynamics::Wide<S>>(dt);
+}
+
+/// Kinematics, bias and factor at q, and x = L^-T (tau - h).
+template <class S>
+STICKSLIP_INLINE void compute_free_motion(RobotLanes<S>& robot, S dt) {
+  const RobotTables& tables = *robot.tables;
+  const S *q = robot.state.q, *u = robot.state.u;
+  dynamics::Tree<S>& t = *robot.tree;
+  dynamics::WalkInput<S> in;
+  S fixed[4];
+  for (int k = 0; k < 4; ++k) fixed[k] = constant<S>(tables.fixed_quaternion[k]);
+  in.quaternion = tables.floating ? q + 3 : fixed;
+  in.joints = robot.joints(q);
+  in.angular_velocity = robot.angular(u);
+  in.rates = u + robot.offset();
+  in.gravity = robot.control.gravity;
+  in.diagonal = implicit_diagonal(robot, dt);
+  const bool driven = control_force(robot, q, u, dt);
+  const Spatial<S> on_base = driven ? base_control(robot) : zero_spatial<S>();
+  in.tau = driven ? robot.force + robot.offset() : nullptr;
+  in.base_force = driven ? &on_base : nullptr;
+  in.base_wrench = robot.control.base_wrench;
+  in.wrenches = robot.control.wrenches;
+  dynamics::compute_free_motion(t, in);
 }
 
 /// One time step. The state of a lane only changes if its result is finite.
@@ -32,15 +56,7 @@ void step_semi_implicit(RobotLanes<S>& robot, const StepSettings& settings) {
   copy(s.impulse, 3 * tables.num_points, robot.backup.impulse);
 
   // Kinematics, bias and factor; x = L^-T dt (tau - h), the free velocity change in L-space.
-  robot.compute_positions(s.q);
-  dynamics::compute_inertias(t);
-  dynamics::factor_mass_matrix<S>(t, implicit_diagonal(robot, dt));
-  dynamics::compute_bias<S>(t, robot.angular(s.u), s.u + offset, robot.control.gravity);
-  const bool driven = control_force(robot, s.q, s.u, dt);
-  if (driven) t.base.force = t.base.force + base_control(robot);
-  add_wrenches(robot);
-  dynamics::solve_lower_transposed<S>(t, driven ? robot.force + offset : nullptr,
-                                      dynamics::LinkForces::kAll);
+  compute_free_motion(robot, dt);
   scale_x(t, settings.time_step);
   timer.end(kDynamics);
 
@@ -65,6 +81,8 @@ void step_semi_implicit(RobotLanes<S>& robot, const StepSettings& settings) {
     for (int k = 0; k < 3 * tables.num_points; ++k) s.impulse[k] = zero;
   }
 
+  record_contacts(robot, everywhere);
+
   // u+ = u + L^-1 (x + Y^T lambda), q+ = q (+) dt u+. A zero is +0, whichever way it came about.
   S base[6], *next = robot.u_plus, *q_new = robot.q_new;
   dynamics::solve_lower(t, base, next + offset);
@@ -79,6 +97,7 @@ void step_semi_implicit(RobotLanes<S>& robot, const StepSettings& settings) {
   if (!all(finite)) {
     copy_where(!finite, robot.backup.impulse, 3 * tables.num_points, s.impulse);
     contacts.forget(!finite);
+    record_contacts(robot, !finite, true);
     robot.info.non_finite = !finite;
     robot.info.unconverged = robot.info.unconverged & finite;
     robot.info.residual = select(finite, robot.info.residual, zero);

@@ -6,9 +6,6 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-
-if not hasattr(ss, "Batch"):
-    pytest.skip("batches are not switched on", allow_module_level=True)
 from batch_scenes import MODEL, anymal, arm
 
 ARRAYS = (

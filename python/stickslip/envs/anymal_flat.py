@@ -101,6 +101,7 @@ class AnymalFlat(VectorTask):
     def setup(self) -> None:
         """Arrays, terms, timers."""
         c = self.config
+        self.base = self.batch.model.bodies[0]
         self._angles = self.default_angles.astype(np.float32)
         self._columns = _contact_columns(self.batch.contact_points, FOOT_FORCE * self.world.time_step)
         self.state = LocomotionState.zeros(
@@ -190,7 +191,7 @@ class AnymalFlat(VectorTask):
             return
         rows = self.state.rows(envs)
         rows.measure(self.batch.q[envs], self.batch.u[envs], self._angles)
-        self.state.set_rows(envs, rows)
+        self.state.set_measured(envs, rows)
 
     def between_steps(self, live: Mask) -> None:
         """New commands."""
@@ -248,7 +249,7 @@ def _contact_columns(points: list[Any], threshold: float) -> ContactColumns:
     for column, point in enumerate(points):
         group = feet if "FOOT" in point.shape else others
         group.setdefault(point.shape if group is feet else point.body, []).append(column)
-    return ContactColumns(list(feet.values()), others["base"], list(others.values()), threshold)
+    return ContactColumns(list(feet.values()), [others.pop("base"), *others.values()], threshold)
 
 
 AnymalFlatEnv = single(AnymalFlat)

@@ -6,7 +6,7 @@ several times faster on it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,14 +19,22 @@ __all__ = ["ContactColumns", "LocomotionState"]
 Array = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
+MEASURED = (
+    "base_height",
+    "base_linear_velocity",
+    "base_angular_velocity",
+    "projected_gravity",
+    "joint_position",
+    "joint_velocity",
+)
+
 
 @dataclass(frozen=True)
 class ContactColumns:
     """Which contact points belong to what, and from which impulse on one counts as a contact."""
 
     feet: list[list[int]]  #: points of each foot
-    base: list[int]
-    others: list[list[int]]  #: points of each body that is neither a foot nor without points, the base included
+    others: list[list[int]]  #: points of each body that is neither a foot nor without points; the base comes first
     threshold: float  #: vertical impulse in a physics step [N s]
 
 
@@ -122,14 +130,14 @@ class LocomotionState:
 
     def measure_contacts(self, impulse: NDArray[Any], columns: ContactColumns) -> None:
         """Contacts and air times after a control step, from the impulses (n, points, 3) of its last physics step."""
-        self.foot_air_time[self.foot_contact] = 0.0
+        self.foot_air_time *= ~self.foot_contact
         before = self.foot_contact.copy(order="K")
         touching = impulse[:, :, 2].T > columns.threshold  # (points, n)
         for foot, points in enumerate(columns.feet):
             np.logical_or.reduce(touching[points], axis=0, out=self.foot_contact[:, foot])
-        np.logical_or.reduce(touching[columns.base], axis=0, out=self.base_contact)
-        self.undesired_contacts[:] = 0.0
-        for points in columns.others:
+        np.logical_or.reduce(touching[columns.others[0]], axis=0, out=self.base_contact)
+        self.undesired_contacts[:] = self.base_contact
+        for points in columns.others[1:]:
             self.undesired_contacts += np.logical_or.reduce(touching[points], axis=0)
         # The landing of a foot that flickers for a step is no touchdown: it was not in the air.
         np.greater(self.foot_air_time, 0.0, out=self.foot_touchdown)
@@ -143,15 +151,13 @@ class LocomotionState:
 
     def rows(self, envs: Envs) -> LocomotionState:
         """A copy of some environments."""
-        values = {field.name: getattr(self, field.name) for field in fields(self)}
-        return LocomotionState(**{n: v[envs] if isinstance(v, np.ndarray) else v for n, v in values.items()})
+        values = vars(self).items()
+        return LocomotionState(**{name: v[envs] if isinstance(v, np.ndarray) else v for name, v in values})
 
-    def set_rows(self, envs: NDArray[np.int64], rows: LocomotionState) -> None:
-        """Puts such a copy back."""
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if isinstance(value, np.ndarray):
-                value[envs] = getattr(rows, field.name)
+    def set_measured(self, envs: NDArray[np.int64], rows: LocomotionState) -> None:
+        """Puts back what `measure` wrote into such a copy."""
+        for name in MEASURED:
+            getattr(self, name)[envs] = getattr(rows, name)
 
 
 def _base_axes(quaternion: Array) -> list[list[Array]]:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["Pushes", "base_mass", "default_randomization", "friction", "initial_state", "push"]
 
 Indices = NDArray[np.int64]
+UPPER = np.triu_indices(3)  # xx xy xz yy yz zz of a matrix
 Randomization = Callable[["AnymalFlat", Indices], None]
 
 
@@ -29,10 +30,9 @@ def friction(task: AnymalFlat, envs: Indices, low: float = 0.5, high: float = 1.
 
 def base_mass(task: AnymalFlat, envs: Indices, low: float = -5.0, high: float = 5.0) -> None:
     """Adds mass to the base [kg]; its inertia grows in proportion, its center of mass stays."""
-    base = task.batch.model.bodies[0]
-    ratio = 1.0 + task.random.uniform(envs, low, high) / base.mass
-    task.batch.body_mass[envs, 0] = ratio * base.mass
-    task.batch.body_inertia[envs, 0] = ratio[:, None] * base.inertia[np.triu_indices(3)]
+    ratio = 1.0 + task.random.uniform(envs, low, high) / task.base.mass
+    task.batch.body_mass[envs, 0] = ratio * task.base.mass
+    task.batch.body_inertia[envs, 0] = ratio[:, None] * task.base.inertia[UPPER]
 
 
 def initial_state(

@@ -1,0 +1,216 @@
+#include "benchmarks/compare/batch_loop.h"
+
+#include <numeric>
+#include <stdexcept>
+
+#include "benchmarks/compare/stickslip_loop.h"
+
+namespace stickslip::benchmarks {
+namespace {
+
+bool has(std::uint32_t status, StepStatus bit) { return status & static_cast<std::uint32_t>(bit); }
+
+/// About the golden section of n and coprime to it: k * stride % n, k = 0, 1, ..., takes all
+/// values, and any few in a row lie far apart. So the lanes of a pack are in different phases.
+int golden_stride(int n) {
+  int stride = std::max(1, static_cast<int>(0.618 * n));
+  while (std::gcd(stride, n) != 1) ++stride;
+  return stride;
+}
+
+}  // namespace
+
+template <class T>
+Batch BatchEngine<T>::make(const Scenario& s, const EngineChoice& choice, int num_envs) {
+  const World world = make_world(s, choice.integrator);
+  BatchOptions options;
+  options.num_envs = num_envs;
+  options.precision = choice.precision;
+  options.num_threads = std::max(1, choice.threads);
+  options.instruction_set = choice.instruction_set;
+  return Batch(world, options);
+}
+
+template <class T>
+BatchEngine<T>::BatchEngine(const Scenario& scenario, const EngineChoice& choice, int num_envs)
+    : scenario_(&scenario),
+      batch_(make(scenario, choice, num_envs)),
+      num_envs_(num_envs),
+      nq_(scenario.model->nq()),
+      nu_(scenario.model->nu()),
+      joints_(scenario.model->num_joints()),
+      points_(static_cast<int>(batch_.contact_points().size())),
+      stride_(golden_stride(num_envs)),
+      q_(data(BatchField::kQ)),
+      u_(data(BatchField::kU)),
+      impulse_(data(BatchField::kContactImpulse)),
+      residual_(data(BatchField::kResidual)),
+      targets_(data(BatchField::kPdTarget)),
+      active_(static_cast<const std::uint8_t*>(batch_.array(BatchField::kContactActive).data)),
+      status_(static_cast<const std::uint32_t*>(batch_.array(BatchField::kStatus).data)),
+      clocks_(num_envs),
+      last_(static_cast<size_t>(num_envs) * joints_),
+      target_(joints_),
+      ruler_(std::make_unique<World>()) {
+  if (choice.integrator == Integrator::kSemiImplicit)
+    opinion_ = std::make_unique<SecondOpinion>(scenario, batch_.contact_points());
+  if (scenario.ends_when_still && moving())
+    throw std::logic_error("targets of a task that ends when still cannot be laid out");
+  ruler_->add_robot(scenario.model);
+  finished_.reserve(num_envs);
+  start_q_.resize(static_cast<size_t>(num_envs) * nq_);
+  start_u_.resize(static_cast<size_t>(num_envs) * nu_);
+  for (int e = 0; e < num_envs; ++e) clocks_[e].episode = e - num_envs;
+
+  prepare(scenario.episode_steps);
+  NoObserver nobody;
+  run(scenario.episode_steps, nobody);
+}
+
+template <class T>
+void BatchEngine<T>::begin(EpisodeClock& clock) const {
+  clock.episode += num_envs_;
+  clock.age = 0;
+  clock.still = 0;
+  clock.end = scenario_->episode_steps;
+  if (clock.episode >= num_envs_) return;
+  const long ticks = clock.end / kTick, phase = clock.episode * long{stride_} % num_envs_ + 1;
+  clock.end = kTick * std::max(1L, ticks * phase / num_envs_);
+}
+
+template <class T>
+long BatchEngine<T>::next_event() const {
+  if (moving() || scenario_->ends_when_still) return kTick;
+  long steps = scenario_->episode_steps;
+  for (const EpisodeClock& clock : clocks_) steps = std::min(steps, clock.end - clock.age);
+  return steps;
+}
+
+template <class T>
+void BatchEngine<T>::prepare(long steps) {
+  if (!moving()) return;
+  std::vector<EpisodeClock> clocks = clocks_;
+  script_.clear();
+  for (long done = 0; done < steps; done += kTick) {
+    for (int e = 0; e < num_envs_; ++e) {
+      EpisodeClock& clock = clocks[e];
+      if (clock.over()) begin(clock);
+      if (clock.age % scenario_->hold_steps == 0) {
+        scenario_->target(clock.episode, static_cast<int>(clock.age / scenario_->hold_steps),
+                          target_);
+        std::copy(target_.begin(), target_.end(), &last_[static_cast<size_t>(e) * joints_]);
+      }
+      clock.age += kTick;
+    }
+    script_.insert(script_.end(), last_.begin(), last_.end());
+  }
+}
+
+template <class T>
+void BatchEngine<T>::reset_finished() {
+  finished_.clear();
+  for (int e = 0; e < num_envs_; ++e) {
+    EpisodeClock& clock = clocks_[e];
+    if (!clock.over()) continue;
+    begin(clock);
+    const size_t k = finished_.size();
+    scenario_->initial_state(clock.episode, {&start_q_[k * nq_], static_cast<size_t>(nq_)},
+                             {&start_u_[k * nu_], static_cast<size_t>(nu_)});
+    finished_.push_back(e);
+    if (moving()) continue;
+    scenario_->target(clock.episode, 0, target_);
+    std::copy(target_.begin(), target_.end(), targets_ + static_cast<size_t>(e) * joints_);
+  }
+  if (finished_.empty()) return;
+  batch_.reset(finished_, {start_q_.data(), finished_.size() * nq_},
+               {start_u_.data(), finished_.size() * nu_});
+}
+
+template <class T>
+void BatchEngine<T>::find_still() {
+  for (int e = 0; e < num_envs_; ++e) {
+    T fastest = 0;
+    for (int k = 0; k < nu_; ++k) {
+      const T rate = std::fabs(u_[static_cast<size_t>(e) * nu_ + k]);
+      fastest = rate > fastest ? rate : fastest;
+    }
+    clocks_[e].still = fastest < static_cast<T>(kStill) ? clocks_[e].still + 1 : 0;
+  }
+}
+
+template <class T>
+void BatchEngine<T>::take(long steps, Observer& observer) {
+  for (long k = 1; k <= steps; ++k) {
+    const bool sampled = k % kTick == 0;
+    if (sampled && opinion_) {
+      before_q_.assign(q_, q_ + static_cast<size_t>(num_envs_) * nq_);
+      before_u_.assign(u_, u_ + static_cast<size_t>(num_envs_) * nu_);
+    }
+    batch_.step(1);
+    for (int e = 0; e < num_envs_; ++e)
+      observer.add_solve(residual_[e], has(status_[e], StepStatus::kNotConverged),
+                         has(status_[e], StepStatus::kNonFinite));
+    if (!sampled) continue;
+    if (opinion_) ask_second_opinion(observer);
+    for (int e = 0; e < num_envs_; ++e) {
+      const long age = clocks_[e].age + k;
+      observer.sample(View{this, e, age}, age);
+    }
+  }
+}
+
+template <class T>
+void BatchEngine<T>::ask_second_opinion(Observer& observer) {
+  for (int e = 0; e < num_envs_; ++e) {
+    const size_t k = e;
+    const auto residual =
+        opinion_->residual(&before_q_[k * nq_], &before_u_[k * nu_], targets_ + k * joints_,
+                           active_ + k * points_, impulse_ + 3 * k * points_);
+    observer.add_second_opinion(residual, has(status_[e], StepStatus::kNotConverged));
+  }
+}
+
+template <class T>
+void BatchEngine<T>::observe(int e, long age, Snapshot& out) {
+  const T *q = q_ + static_cast<size_t>(e) * nq_, *u = u_ + static_cast<size_t>(e) * nu_;
+  out.q.assign(q, q + nq_);
+  out.u.assign(u, u + nu_);
+  out.contacts = out.pushing = out.iterations = 0;
+  for (int p = 0; p < points_; ++p) {
+    const size_t k = static_cast<size_t>(e) * points_ + p;
+    out.contacts += active_[k] != 0;
+    out.pushing += impulse_[3 * k + 2] > Snapshot::kLeastForce * kTimeStep;
+  }
+  out.energy = 0;
+  if (!scenario_->shows_energy ||
+      (age != std::lround(scenario_->settle / kTimeStep) && age != scenario_->episode_steps))
+    return;
+  Robot& robot = ruler_->robot(0);
+  robot.set_state(out.q, out.u);
+  out.energy = robot.kinetic_energy() + robot.potential_energy();
+}
+
+template <class T>
+std::uint64_t BatchEngine<T>::hash(std::uint64_t seed) const {
+  const std::vector<double> u(u_, u_ + static_cast<size_t>(num_envs_) * nu_);
+  return hash_of(u, seed);
+}
+
+template <class T>
+void BatchEngine<T>::mark() {
+  mark_ = {batch_.save_state(), clocks_,
+           std::vector<T>(targets_, targets_ + static_cast<size_t>(num_envs_) * joints_), last_};
+}
+
+template <class T>
+void BatchEngine<T>::rewind() {
+  batch_.load_state(mark_.state);
+  clocks_ = mark_.clocks;
+  last_ = mark_.last;
+  set_targets(mark_.targets.data());
+}
+
+template class BatchEngine<float>;
+template class BatchEngine<double>;
+
+}  // namespace stickslip::benchmarks

@@ -1,0 +1,39 @@
+// An engine on a task, cut into repetitions that can be timed, and watched again later.
+#pragma once
+#include <memory>
+
+#include "benchmarks/compare/engine_choice.h"
+#include "benchmarks/compare/observer.h"
+
+namespace stickslip::benchmarks {
+
+struct Settings {
+  long steps = 20'000;  ///< per repetition; a batch takes kBatchWork times as many robot-steps
+  int repetitions = 7;  ///< counted; one more warms up
+  int robots = 64;      ///< of a batch; kLargeBatch times as many where threads are compared
+  std::vector<EngineChoice> engines;
+  bool statistics = true;
+
+  static constexpr int kBatchWork = 16, kLargeBatch = 16;
+};
+
+class Runner {
+ public:
+  virtual ~Runner() = default;
+  virtual void prepare() {}  ///< for the next repetition; not timed
+  virtual void run() = 0;    ///< one repetition
+  virtual void mark() = 0;   ///< here the first counted repetition begins
+  virtual void rewind() = 0;
+  virtual void watch(Observer& observer) = 0;  ///< one repetition, observed
+
+  virtual std::uint64_t hash(std::uint64_t seed) const = 0;  ///< of all velocities
+  virtual long robot_steps() const = 0;                      ///< of a repetition
+  virtual int robots() const { return 1; }
+  virtual std::string instruction_set() const { return ""; }  ///< of a batch
+};
+
+/// Throws ModelError where a batch cannot be made so: another instruction set than the machine has.
+std::unique_ptr<Runner> make_runner(const EngineChoice& engine, const Scenario& scenario,
+                                    const Settings& settings);
+
+}  // namespace stickslip::benchmarks

@@ -1,0 +1,75 @@
+// The step of a pack of environments as functions behind a table, one per instruction set and
+// number format. What goes in and out is plain data, so that code of different instruction sets
+// shares it.
+#pragma once
+#include <cstdint>
+
+#include "step/step_tables.h"
+
+namespace stickslip::backend {
+
+/// A robot as kernels of one pack shape see it. T: float or double.
+struct PackScene {
+  const step::RobotTables* tables;
+  int num_bundles, num_slots, num_joints;  // of the layout with PackKernels::bundle_lanes
+  const dynamics::Bundle* bundles;
+  const dynamics::Slot* slots;
+  const void* constants;  // T (slots, 22, lanes of a bundle): LinkConstants
+  double base_mass, base_com[3], base_inertia[6];
+};
+
+/// A parameter: one row for all environments, or one each. T.
+struct Parameter {
+  const void* data = nullptr;  // null: none (optional ones only)
+  bool per_env = false;
+};
+
+/// The arrays of a batch: T unless said, (environments, ...) row-major, padded to whole packs.
+struct EnvArrays {
+  void *q, *u, *generalized_force, *pd_target, *contact_impulse, *residual;
+  std::uint8_t* contact_active;
+  std::uint32_t* status;
+  double* time;
+  Parameter kp, kd, friction, gravity;
+  Parameter external_wrench;  // optional
+  bool force;                 // generalized_force is in use
+  void* history;              // T, see PackHistory
+};
+
+/// What an environment carries from step to step besides q and u, per pack: T (numbers, lanes).
+/// Order: q and u that the last step left, warm-start impulses, drift acceleration, pending
+/// gravity, and whether the state is new (1) or of a step (0).
+struct PackHistory {
+  int q, u, impulse, drift, pending, fresh, numbers;  // first row of each
+  explicit PackHistory(const step::RobotTables& t)
+      : q(0),
+        u(t.nq),
+        impulse(u + t.nu),
+        drift(impulse + 3 * t.num_points),
+        pending(drift + t.nu),
+        fresh(pending + 1),
+        numbers(fresh + 1) {}
+};
+
+/// Mass properties of a pack's environments; null: the model's.
+struct PackInertias {
+  const void* links = nullptr;  // T (slots, 10, lanes): LinkInertia
+  const void* base = nullptr;   // T (10, width): of body 0
+};
+
+/// One compiled pack. Every function is free of allocation and of shared state.
+struct PackKernels {
+  const char* instruction_set;
+  bool single;       // float, else double
+  int width;         // environments of a pack
+  int bundle_lanes;  // of PackScene::constants
+  long (*workspace_bytes)(const PackScene&);
+  /// Lays a workspace out; aligned to 64.
+  void (*prepare)(void* workspace, const PackScene&);
+  /// Steps the environments of a pack; `first` is a multiple of the width. The same workspace may
+  /// serve any pack. Returns the status bits of its environments below `num_envs`, or-ed.
+  std::uint32_t (*step)(void* workspace, const EnvArrays&, const PackInertias&,
+                        const step::StepSettings&, long first, long num_envs, int steps);
+};
+
+}  // namespace stickslip::backend
