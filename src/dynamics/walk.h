@@ -142,7 +142,7 @@ template <class S>
 void chain_factor(Tree<S>& t, const Bundle& b, const S* diagonal) {
   using W = Wide<S>;
   const int last = b.first_slot + b.length - 1;
-  ArticulatedInertia<W> rest;
+  ArticulatedInertia<W> rest{};  // set by the first block
   blocks_inward(b, [&](int slot, auto n) STICKSLIP_LAMBDA {
     constexpr int N = decltype(n)::value;
     const int end = slot + N - 1;
