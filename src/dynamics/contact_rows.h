@@ -12,7 +12,7 @@ struct ContactRows {
   int depth;
   LinkIndex* path;  // capacity: deepest joint of the tree
   Row3<S>* joint;   // same capacity
-  Row3<S> base[6];  // columns of the base, order of u
+  Row3<S>* base;    // columns of the base (6), order of u
 };
 
 /// `point` relative to the base origin; contact axes along the world's.
@@ -45,8 +45,8 @@ void compute_contact_rows(const Tree<S>& t, LinkIndex link, const Vec3<S>& point
     rows.joint[rows.depth++] = z;
     link = t.slots[link.slot].parent[link.lane];
   }
+  if (t.floating) solve_base_transposed(t.base, f);
   for (int k = 0; k < 6; ++k) rows.base[k] = f[k];
-  if (t.floating) solve_base_transposed(t.base, rows.base);
 }
 
 /// One row Y = J L^-1: the unit force `axis` at `point`. Calls put_joint(link, entry) for the

@@ -30,9 +30,10 @@ STICKSLIP_INLINE Spatial<W> move_to_link(const LinkConstants<K>& c, bool prismat
 /// (D5) at the pose of the link, from constants of the model or of each environment.
 template <class W, class K>
 STICKSLIP_INLINE void place_inertia(const LinkInertia<K>& c, LinkState<W>& link) {
-  const Mat3<W> r = link.rotation;
-  link.inertia = inertia_at_reference(W(c.mass), madd(r, wide3<W>(c.com), link.position),
-                                      rotate(r, wide_sym3<W>(c.inertia)));
+  const Mat3<W>& r = link.rotation;
+  store(inertia_at_reference(W(c.mass), madd(r, wide3<W>(c.com), link.position),
+                             rotate(r, wide_sym3<W>(c.inertia))),
+        link.inertia);
 }
 
 /// (D6): velocity, acceleration and A of the parent become those of the link. Returns minus the
@@ -46,40 +47,6 @@ STICKSLIP_INLINE Spatial<W> bias_of_link(const LinkState<W>& link, bool prismati
   change_field(v.ang, a.ang, link.position, field, a.lin);
   if (prismatic) a.lin = cross(v.ang, link.axis.lin * (rate + rate), a.lin);
   return -inertial_force(link.inertia, v.ang, a, field);
-}
-
-/// (D13): this joint's coordinate of y = L u; `v` is the parent's velocity.
-template <class W>
-STICKSLIP_INLINE W multiply_at_link(const LinkState<W>& link, const Spatial<W>& v,
-                                    const Vec3<W>& translation, W rate) {
-  const W from_parent = dot(link.arm.ang, v.ang) + dot(link.arm.lin, v.lin + translation);
-  return madd(link.root, rate, from_parent);
-}
-
-/// (D8): row of L of the joint, from the articulated inertia of its link. Returns what is left for
-/// the parent (D7).
-template <class W>
-STICKSLIP_INLINE ArticulatedInertia<W> factor_at_link(const ArticulatedInertia<W>& i,
-                                                      const Spatial<W>& axis, const W* extra,
-                                                      LinkState<W>& link) {
-  const Spatial<W> u = i * axis;
-  W d = dot(u, axis);
-  if (extra) d = d + *extra;
-  const W inverse = constant<W>(1) / d;
-  link.root = sqrt(d);
-  link.inv_root = link.root * inverse;
-  link.arm = u * link.inv_root;
-  return without(i, u, u * inverse);
-}
-
-/// (D11): x of the joint from the force on its link. Returns what is passed on.
-template <class W>
-STICKSLIP_INLINE Spatial<W> solve_at_link(const Spatial<W>& f, const Spatial<W>& axis, const W* tau,
-                                          LinkState<W>& link) {
-  W on_joint = dot(f, axis);
-  if (tau) on_joint = on_joint + *tau;
-  link.x = on_joint * link.inv_root;
-  return nmadd(link.arm, link.x, f);
 }
 
 /// A wrench at the center of mass of a body as a force at the base origin.

@@ -46,14 +46,13 @@ S solve_lower(Tree<S>& t, S base[6], S* joints) {
     const Bundle& b = t.bundles[ib];
     Spatial<W> a = from_parents<S, Spatial>(t, b, of_base, &LinkState<W>::acceleration);
     W chain = constant<W>(0);
+    blocks_outward(b, [&](int slot, auto n) STICKSLIP_LAMBDA {
+      solve_block<decltype(n)::value>(t.links + slot, a, [&](int k, W rate) STICKSLIP_LAMBDA {
+        store_lanes<S>(rate, joints, t.slots[slot + k].joint, b.lanes);
+        chain = madd(t.links[slot + k].x, t.links[slot + k].x, chain);
+      });
+    });
     const int last = b.first_slot + b.length - 1;
-    for (int slot = b.first_slot; slot <= last; ++slot) {
-      LinkState<W>& link = t.links[slot];
-      const W rate = (link.x - dot(link.arm, a)) * link.inv_root;
-      store_lanes<S>(rate, joints, t.slots[slot].joint, b.lanes);
-      chain = madd(link.x, link.x, chain);
-      a = madd(link.axis, rate, a);
-    }
     if (b.has_children) t.links[last].acceleration = a;
     sum = add_lanes<S>(chain, b.lanes, sum);
   }

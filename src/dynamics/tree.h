@@ -19,6 +19,7 @@ struct LinkState {
   Spatial<W> force;         // applied to the link
   Spatial<W> arm;    // U = I_A s / sqrt(D): row of the factor L, as a force at the base origin
   W root, inv_root;  // sqrt(D), 1 / sqrt(D), D = s . I_A s: diagonal of L
+  W inner[2];        // entries of L to the joints before it in its block: parent, grandparent
   W x;               // coordinate of this joint in L-space, x = L^-T (generalized force)
   ArticulatedInertia<W> from_children;  // sums over the chains that hang on this link
   Spatial<W> force_from_children;

@@ -4,6 +4,7 @@
 // part.
 #pragma once
 #include "dynamics/base.h"
+#include "dynamics/block.h"
 #include "dynamics/link.h"
 
 namespace stickslip::dynamics::inline STICKSLIP_KERNELS {
@@ -71,9 +72,10 @@ void chain_positions(Tree<S>& t, const Bundle& b, const S* joints) {
   for (int slot = b.first_slot; slot < b.first_slot + b.length; ++slot) {
     LinkState<W>& link = t.links[slot];
     const Slot& s = t.slots[slot];
-    link.axis = move_to_link(t.constants[slot], s.prismatic, load_lanes(joints, s.joint), r, p);
-    link.rotation = r;
-    link.position = p;
+    store(move_to_link(t.constants[slot], s.prismatic, load_lanes(joints, s.joint), r, p),
+          link.axis);
+    store(r, link.rotation);
+    store(p, link.position);
   }
 }
 
@@ -102,7 +104,7 @@ void chain_velocities(Tree<S>& t, const Bundle& b, const S* rates) {
   Spatial<W> v = from_parents<S, Spatial>(t, b, t.base.velocity, &LinkState<W>::velocity);
   for (int slot = b.first_slot; slot < b.first_slot + b.length; ++slot) {
     v = madd(t.links[slot].axis, load_lanes(rates, t.slots[slot].joint), v);
-    t.links[slot].velocity = v;
+    store(v, t.links[slot].velocity);
   }
 }
 
@@ -112,12 +114,13 @@ void chain_bias(Tree<S>& t, const Bundle& b, const S* rates) {
   Spatial<W> v = from_parents<S, Spatial>(t, b, t.base.velocity, &LinkState<W>::velocity);
   Spatial<W> a = from_parents<S, Spatial>(t, b, t.base.acceleration, &LinkState<W>::acceleration);
   Mat3<W> field = acceleration_field(v.ang, a.ang);
-  for (int slot = b.first_slot; slot < b.first_slot + b.length; ++slot) {
+  const int last = b.first_slot + b.length - 1;
+  for (int slot = b.first_slot; slot <= last; ++slot) {
     LinkState<W>& link = t.links[slot];
     const Slot& s = t.slots[slot];
-    link.force = bias_of_link(link, s.prismatic, load_lanes(rates, s.joint), v, a, field);
-    link.velocity = v;
-    link.acceleration = a;
+    store(bias_of_link(link, s.prismatic, load_lanes(rates, s.joint), v, a, field), link.force);
+    store(v, link.velocity);
+    if (slot == last && b.has_children) store(a, link.acceleration);
   }
 }
 
@@ -125,12 +128,12 @@ template <class S>
 void chain_multiply(Tree<S>& t, const Bundle& b, const Vec3<S>& translation, const S* rates) {
   using W = Wide<S>;
   Spatial<W> v = from_parents<S, Spatial>(t, b, t.base.velocity, &LinkState<W>::velocity);
-  for (int slot = b.first_slot; slot < b.first_slot + b.length; ++slot) {
-    LinkState<W>& link = t.links[slot];
-    link.x =
-        multiply_at_link(link, v, wide<W>(translation), load_lanes(rates, t.slots[slot].joint));
-    v = link.velocity;
-  }
+  blocks_outward(b, [&](int slot, auto n) STICKSLIP_LAMBDA {
+    constexpr int N = decltype(n)::value;
+    v.lin = v.lin + wide<W>(translation);
+    multiply_block<N>(t, slot, rates, v);
+    v = t.links[slot + N - 1].velocity;
+  });
 }
 
 // ---- inward
@@ -139,32 +142,29 @@ template <class S>
 void chain_factor(Tree<S>& t, const Bundle& b, const S* diagonal) {
   using W = Wide<S>;
   const int last = b.first_slot + b.length - 1;
-  ArticulatedInertia<W> i = articulated(t.links[last].inertia);
-  if (b.has_children) i = i + t.links[last].from_children;
-  for (int slot = last;; --slot) {
-    LinkState<W>& link = t.links[slot];
-    W extra;
-    if (diagonal) extra = load_lanes(diagonal, t.slots[slot].joint);
-    i = factor_at_link(i, link.axis, diagonal ? &extra : nullptr, link);
-    if (slot == b.first_slot) break;
-    i = i + t.links[slot - 1].inertia;
-  }
-  add_to_parents<S, ArticulatedInertia>(t, b, i, t.base.articulated, &LinkState<W>::from_children);
+  ArticulatedInertia<W> rest;
+  blocks_inward(b, [&](int slot, auto n) STICKSLIP_LAMBDA {
+    constexpr int N = decltype(n)::value;
+    const int end = slot + N - 1;
+    if (end != last)
+      rest = factor_block<N>(t, slot, rest + t.links[end].inertia, diagonal);
+    else if (b.has_children)
+      rest = factor_block<N>(t, slot, t.links[end].from_children + t.links[end].inertia, diagonal);
+    else
+      rest = factor_block<N>(t, slot, t.links[end].inertia, diagonal);
+  });
+  add_to_parents<S, ArticulatedInertia>(t, b, rest, t.base.articulated,
+                                        &LinkState<W>::from_children);
 }
 
 template <bool kLinkForces, class S>
 void chain_solve_transposed(Tree<S>& t, const Bundle& b, const S* tau, Spatial<S>& on_base) {
   using W = Wide<S>;
-  const int last = b.first_slot + b.length - 1;
   Spatial<W> f = zero_spatial<W>();
-  for (int slot = last; slot >= b.first_slot; --slot) {
-    LinkState<W>& link = t.links[slot];
-    if constexpr (kLinkForces) f = f + link.force;
-    if (slot == last && b.has_children) f = f + link.force_from_children;
-    W on_joint;
-    if (tau) on_joint = load_lanes(tau, t.slots[slot].joint);
-    f = solve_at_link(f, link.axis, tau ? &on_joint : nullptr, link);
-  }
+  if (b.has_children) f = t.links[b.first_slot + b.length - 1].force_from_children;
+  blocks_inward(b, [&](int slot, auto n) STICKSLIP_LAMBDA {
+    solve_transposed_block<decltype(n)::value, kLinkForces>(t, slot, tau, f);
+  });
   add_to_parents<S, Spatial>(t, b, f, on_base, &LinkState<W>::force_from_children);
 }
 
@@ -220,7 +220,7 @@ void walk(Tree<S>& t, const WalkInput<S>& in) {
       if (!kAtOnce || t.bundles[ib].has_children) walk_outward<kParts>(t, t.bundles[ib], in);
   if constexpr (kInward) {
     clear_sums<kParts>(t);
-    if constexpr (kParts & kFactor) t.base.articulated = articulated(t.base.inertia);
+    if constexpr (kParts & kFactor) store(articulated(t.base.inertia), t.base.articulated);
     Spatial<S> on_base;
     if constexpr (kParts & kSolveTransposed) {
       if constexpr (kParts & kLinkForces)

@@ -96,4 +96,11 @@ struct Numbers<S, ArticulatedInertia> {
   }
 };
 
+/// to = from, number by number: GCC 12 holds in memory what is copied whole.
+template <template <class> class X, class S>
+STICKSLIP_INLINE void store(const X<S>& from, X<S>& to) {
+  S* numbers = reinterpret_cast<S*>(&to);
+  Numbers<S, X>::visit(from, [&](int k, const S& x) STICKSLIP_LAMBDA { numbers[k] = x; });
+}
+
 }  // namespace stickslip::inline STICKSLIP_KERNELS

@@ -62,11 +62,6 @@ template <class S>
 STICKSLIP_INLINE RigidInertia<S> operator+(const RigidInertia<S>& a, const RigidInertia<S>& b) {
   return {a.mass + b.mass, a.h + b.h, a.rot + b.rot};
 }
-/// Momentum I v.
-template <class S>
-STICKSLIP_INLINE Spatial<S> operator*(const RigidInertia<S>& a, const Spatial<S>& v) {
-  return {madd(a.rot, v.ang, cross(a.h, v.lin)), madd(v.lin, a.mass, -cross(a.h, v.ang))};
-}
 /// A with A r + a the acceleration of the point r of a body, a that of its point at the reference:
 /// [alpha]x + w w^T - |w|^2.
 template <class S>
@@ -108,12 +103,12 @@ STICKSLIP_INLINE Spatial<S> inertial_force(const RigidInertia<S>& i, const Vec3<
 template <class S>
 STICKSLIP_INLINE RigidInertia<S> inertia_at_reference(S m, const Vec3<S>& c,
                                                       const Sym3<S>& about_com) {
-  const Vec3<S> h = c * m;
-  const S xx = h.x * c.x, yy = h.y * c.y, zz = h.z * c.z;
+  const S hx = c.x * m, hy = c.y * m, hz = c.z * m;
+  const S xx = hx * c.x, yy = hy * c.y, zz = hz * c.z;
   return {m,
-          h,
-          {about_com.xx + (yy + zz), nmadd(h.x, c.y, about_com.xy), nmadd(h.x, c.z, about_com.xz),
-           about_com.yy + (xx + zz), nmadd(h.y, c.z, about_com.yz), about_com.zz + (xx + yy)}};
+          {hx, hy, hz},
+          {about_com.xx + (yy + zz), nmadd(hx, c.y, about_com.xy), nmadd(hx, c.z, about_com.xz),
+           about_com.yy + (xx + zz), nmadd(hy, c.z, about_com.yz), about_com.zz + (xx + yy)}};
 }
 
 /// Articulated-body inertia: (moment; force) = [aa al; al^T ll] (angular; linear) [Featherstone
@@ -153,23 +148,50 @@ STICKSLIP_INLINE ArticulatedInertia<S> operator+(const ArticulatedInertia<S>& a,
           a.ll + b.ll};
 }
 template <class S>
-STICKSLIP_INLINE Spatial<S> operator*(const ArticulatedInertia<S>& a, const Spatial<S>& v) {
-  return {madd(a.aa, v.ang, a.al * v.lin), transposed_madd(a.al, v.ang, a.ll * v.lin)};
+STICKSLIP_INLINE const ArticulatedInertia<S>& articulated(const ArticulatedInertia<S>& a) {
+  return a;
 }
-/// I - u (u / d)^T: what is left of the inertia when a joint with u = I s, d = s . u is free to
-/// move.
 template <class S>
-STICKSLIP_INLINE ArticulatedInertia<S> without(const ArticulatedInertia<S>& i, const Spatial<S>& u,
-                                               const Spatial<S>& u_over_d) {
-  const Vec3<S>&n = u.ang, &f = u.lin, &a = u_over_d.ang, &b = u_over_d.lin;
-  ArticulatedInertia<S> r;
-  r.aa = {nmadd(a.x, n.x, i.aa.xx), nmadd(a.x, n.y, i.aa.xy), nmadd(a.x, n.z, i.aa.xz),
-          nmadd(a.y, n.y, i.aa.yy), nmadd(a.y, n.z, i.aa.yz), nmadd(a.z, n.z, i.aa.zz)};
-  r.al = {{nmadd(a.x, f.x, i.al.m[0]), nmadd(a.x, f.y, i.al.m[1]), nmadd(a.x, f.z, i.al.m[2]),
-           nmadd(a.y, f.x, i.al.m[3]), nmadd(a.y, f.y, i.al.m[4]), nmadd(a.y, f.z, i.al.m[5]),
-           nmadd(a.z, f.x, i.al.m[6]), nmadd(a.z, f.y, i.al.m[7]), nmadd(a.z, f.z, i.al.m[8])}};
-  r.ll = {nmadd(b.x, f.x, i.ll.xx), nmadd(b.x, f.y, i.ll.xy), nmadd(b.x, f.z, i.ll.xz),
-          nmadd(b.y, f.y, i.ll.yy), nmadd(b.y, f.z, i.ll.yz), nmadd(b.z, f.z, i.ll.zz)};
+STICKSLIP_INLINE Spatial<S> operator*(const ArticulatedInertia<S>& a, const Spatial<S>& v) {
+  // sums of two short chains instead of one long
+  return {a.aa * v.ang + a.al * v.lin, transposed_times(a.al, v.ang) + a.ll * v.lin};
+}
+/// Momentum I v: the same operations as for the articulated inertia, those with zero left out.
+template <class S>
+STICKSLIP_INLINE Spatial<S> operator*(const RigidInertia<S>& a, const Spatial<S>& v) {
+  const Vec3<S>&h = a.h, &w = v.ang, &l = v.lin;
+  const Vec3<S> moment{madd(h.y, l.z, -(h.z * l.y)), nmadd(h.x, l.z, h.z * l.x),
+                       madd(h.x, l.y, -(h.y * l.x))};
+  const Vec3<S> force{nmadd(h.y, w.z, h.z * w.y), madd(h.x, w.z, -(h.z * w.x)),
+                      nmadd(h.x, w.y, h.y * w.x)};
+  return {a.rot * w + moment, force + l * a.mass};
+}
+/// I - sum of u u^T: what is left of the inertia when joints with these U are free to move. Number by
+/// number, so that there are few values to hold.
+template <class S, class... U>
+STICKSLIP_INLINE ArticulatedInertia<S> without(const ArticulatedInertia<S>& i, const U&... u) {
+  ArticulatedInertia<S> r = i;
+  ((r.aa.xx = nmadd(u.ang.x, u.ang.x, r.aa.xx)), ...);
+  ((r.aa.xy = nmadd(u.ang.x, u.ang.y, r.aa.xy)), ...);
+  ((r.aa.xz = nmadd(u.ang.x, u.ang.z, r.aa.xz)), ...);
+  ((r.aa.yy = nmadd(u.ang.y, u.ang.y, r.aa.yy)), ...);
+  ((r.aa.yz = nmadd(u.ang.y, u.ang.z, r.aa.yz)), ...);
+  ((r.aa.zz = nmadd(u.ang.z, u.ang.z, r.aa.zz)), ...);
+  ((r.al.m[0] = nmadd(u.ang.x, u.lin.x, r.al.m[0])), ...);
+  ((r.al.m[1] = nmadd(u.ang.x, u.lin.y, r.al.m[1])), ...);
+  ((r.al.m[2] = nmadd(u.ang.x, u.lin.z, r.al.m[2])), ...);
+  ((r.al.m[3] = nmadd(u.ang.y, u.lin.x, r.al.m[3])), ...);
+  ((r.al.m[4] = nmadd(u.ang.y, u.lin.y, r.al.m[4])), ...);
+  ((r.al.m[5] = nmadd(u.ang.y, u.lin.z, r.al.m[5])), ...);
+  ((r.al.m[6] = nmadd(u.ang.z, u.lin.x, r.al.m[6])), ...);
+  ((r.al.m[7] = nmadd(u.ang.z, u.lin.y, r.al.m[7])), ...);
+  ((r.al.m[8] = nmadd(u.ang.z, u.lin.z, r.al.m[8])), ...);
+  ((r.ll.xx = nmadd(u.lin.x, u.lin.x, r.ll.xx)), ...);
+  ((r.ll.xy = nmadd(u.lin.x, u.lin.y, r.ll.xy)), ...);
+  ((r.ll.xz = nmadd(u.lin.x, u.lin.z, r.ll.xz)), ...);
+  ((r.ll.yy = nmadd(u.lin.y, u.lin.y, r.ll.yy)), ...);
+  ((r.ll.yz = nmadd(u.lin.y, u.lin.z, r.ll.yz)), ...);
+  ((r.ll.zz = nmadd(u.lin.z, u.lin.z, r.ll.zz)), ...);
   return r;
 }
 

@@ -87,6 +87,14 @@ STICKSLIP_INLINE Vec3<S> madd(const Mat3<S>& a, const Vec3<S>& b, const Vec3<S>&
           madd(m[5], b.z, madd(m[4], b.y, madd(m[3], b.x, c.y))),
           madd(m[8], b.z, madd(m[7], b.y, madd(m[6], b.x, c.z)))};
 }
+/// A^T b
+template <class S>
+STICKSLIP_INLINE Vec3<S> transposed_times(const Mat3<S>& a, const Vec3<S>& b) {
+  const S* m = a.m;
+  return {madd(m[6], b.z, madd(m[3], b.y, m[0] * b.x)),
+          madd(m[7], b.z, madd(m[4], b.y, m[1] * b.x)),
+          madd(m[8], b.z, madd(m[5], b.y, m[2] * b.x))};
+}
 /// A^T b + c
 template <class S>
 STICKSLIP_INLINE Vec3<S> transposed_madd(const Mat3<S>& a, const Vec3<S>& b, const Vec3<S>& c) {

@@ -91,8 +91,9 @@ class ContactStage {
 
  private:
   static constexpr double kReach = 2e-3;  // candidates this near take part whatever their speed [m]
-  static int flat(dynamics::LinkIndex link) { return link.slot * dynamics::kMaxLanes + link.lane; }
-  int links() const { return tables_->num_slots * dynamics::kMaxLanes; }
+  static constexpr int kLanes = dynamics::Tree<S>::kLanes;
+  static int flat(dynamics::LinkIndex link) { return link.slot * kLanes + link.lane; }
+  int links() const { return tables_->num_slots * kLanes; }
 
   void add(int shape, int point, const Vec3<S>& position, S gap, Mask<S> active);
   /// Takes the points lower than `reach` above the ground.

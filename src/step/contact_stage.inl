@@ -169,6 +169,7 @@ void ContactStage<S>::compute_rows(dynamics::Tree<S>& tree) {
   for (int k = 0; k < links(); ++k) once_[k] = shared_[k] = none<S>(), dof_[k] = -1;
   for (int i = 0; i < count_; ++i) {
     ActiveContact<S>& a = active_[i];
+    a.rows.base = problem_.y(i);  // where the problem wants them
     dynamics::compute_contact_rows(tree, tables_->shapes[a.shape].link, a.position, a.rows);
     for (int k = 0; k < a.rows.depth; ++k) {
       const int j = flat(a.rows.path[k]);
@@ -228,17 +229,54 @@ STICKSLIP_INLINE Row3<S> row_where(Mask<S> m, const Row3<S>& row) {
   return make_row3(select(m, v[0], zero), select(m, v[1], zero), select(m, v[2], zero));
 }
 
+/// Sum of row row^T, a symmetric block. For a plain scalar by columns, one register each; for packs
+/// by its six numbers.
+template <class S>
+class BlockSum {
+ public:
+  BlockSum() {
+    const S o = constant<S>(0);
+    if constexpr (kPlain)
+      for (auto& column : columns_) column = make_row3(o, o, o);
+    else
+      for (S& x : numbers_) x = o;
+  }
+  STICKSLIP_INLINE void add(const Row3<S>& row) {
+    S z[3];
+    store(row, z);
+    if constexpr (kPlain)
+      for (int r = 0; r < 3; ++r) columns_[r] = madd(row, z[r], columns_[r]);
+    else
+      for (int r = 0, k = 0; r < 3; ++r)
+        for (int c = r; c < 3; ++c, ++k) numbers_[k] = madd(z[c], z[r], numbers_[k]);
+  }
+  /// xx xy xz yy yz zz.
+  STICKSLIP_INLINE void store_to(S block[6]) const {
+    if constexpr (kPlain) {
+      S columns[3][3];
+      for (int r = 0; r < 3; ++r) store(columns_[r], columns[r]);
+      for (int r = 0, k = 0; r < 3; ++r)
+        for (int c = r; c < 3; ++c, ++k) block[k] = columns[r][c];
+    } else {
+      for (int k = 0; k < 6; ++k) block[k] = numbers_[k];
+    }
+  }
+
+ private:
+  static constexpr bool kPlain = ScalarTraits<S>::kWidth == 1;
+  Row3<S> columns_[kPlain ? 3 : 1];
+  S numbers_[kPlain ? 1 : 6];
+};
+
 template <class S>
 void ContactStage<S>::fill_contact(const dynamics::Tree<S>& tree, const ActiveContact<S>& a,
                                    const S* friction, bool with_x) {
-  const S zero = constant<S>(0);
   const int base_dofs = tables_->floating ? 6 : 0, c = problem_.add();
-  Row3<S>* y = problem_.y(c);
-  for (int k = 0; k < base_dofs; ++k) y[k] = a.rows.base[k], index_[k] = k;
+  Row3<S>* y = problem_.y(c);  // of the base already
+  for (int k = 0; k < base_dofs; ++k) index_[k] = k;
   int touched = base_dofs;
   Row3<S> offset = make_row3(a.velocity.x, a.velocity.y, a.velocity.z + a.shift);
-  Row3<S> own[3];  // columns of the private block
-  for (auto& column : own) column = make_row3(zero, zero, zero);
+  BlockSum<S> own;  // the private block
   for (int k = a.rows.depth - 1; k >= 0; --k) {
     const dynamics::LinkIndex link = a.rows.path[k];
     const int dof = dof_[flat(link)];
@@ -250,16 +288,11 @@ void ContactStage<S>::fill_contact(const dynamics::Tree<S>& tree, const ActiveCo
       if (!any(a.active & !shared)) continue;
       row = row_where(!shared, row);
     }
-    S z[3];
-    store(row, z);
-    for (int r = 0; r < 3; ++r) own[r] = madd(row, z[r], own[r]);
+    own.add(row);
     if (with_x)
       offset = madd(row, dynamics::lane_of<S>(tree.links[link.slot].x, link.lane), offset);
   }
-  S columns[3][3], *p = problem_.private_block(c);
-  for (int r = 0; r < 3; ++r) store(own[r], columns[r]);
-  p[0] = columns[0][0], p[1] = columns[0][1], p[2] = columns[0][2];
-  p[3] = columns[1][1], p[4] = columns[1][2], p[5] = columns[2][2];
+  own.store_to(problem_.private_block(c));
   if (num_shared_ > 0 || !tables_->floating) problem_.set_index(c, index_, touched);
   store(offset, problem_.offset(c));
   problem_.friction(c) = friction[a.shape];
@@ -304,8 +337,9 @@ void ContactStage<S>::solve(const StepSettings& settings, Mask<S> live, S* warm,
   for (int k = 0; k < 3 * tables_->num_points; ++k) warm[k] = select(live, zero, warm[k]);
   for (int i = 0; i < count_; ++i)
     for (int r = 0; r < 3; ++r) {
-      S& w = warm[3 * active_[i].id + r];
-      w = select(live & active_[i].active, problem_.impulse(i)[r] / h, w);
+      S &impulse = problem_.impulse(i)[r], &w = warm[3 * active_[i].id + r];
+      impulse = impulse + zero;  // a zero is +0, whichever way it came about
+      w = select(live & active_[i].active, impulse / h, w);
     }
 }
 

@@ -306,7 +306,8 @@ void Robot::delassus(std::span<const int> bodies, std::span<const Vector3> point
       throw ModelError("delassus: bodies[" + std::to_string(i) +
                        "] = " + std::to_string(bodies[i]) + " is not a body of " + name());
     check("delassus: points[" + std::to_string(i) + "]", "", points[i], 3);
-    dynamics::ContactRows<double> rows{0, path.data(), joint.data(), {}};
+    Row3<double> base_rows[6];
+    dynamics::ContactRows<double> rows{0, path.data(), joint.data(), base_rows};
     const Vec3<double> p = Vec3<double>{points[i][0], points[i][1], points[i][2]} - base;
     dynamics::compute_contact_rows(t, d.memory.layout().link_of_body[bodies[i]], p, rows);
     const auto put = [&](size_t column, const Row3<double>& value) {
