@@ -16,6 +16,8 @@ KERNEL_FOLDERS = ("lane", "spatial", "dynamics", "collide", "contact", "step")
 # The host side (worlds, batches, solvers of the public API): held to the rules that keep bits equal, free to use the
 # standard library.
 HOST_FOLDERS = ("solvers", "backend")
+# Kernels in a folder of the host side: what is compiled per instruction set.
+KERNEL_FILES = {"backend/cpu/pack_kernels.cc", "backend/cpu/pack_lanes.h"}
 
 # Headers of kernel folders for the host side: they size memory and read models.
 HOST_HEADERS = {
@@ -69,7 +71,8 @@ def without_comments(text: str) -> str:
 def findings(path: Path, name: str) -> list[str]:
     """What breaks a rule in the file that is called `name` below src."""
     header = path.suffix in (".h", ".inl")
-    kernel = header and name.startswith(KERNEL_FOLDERS) and name not in HOST_HEADERS
+    of_kernels = header and name.startswith(KERNEL_FOLDERS) and name not in HOST_HEADERS
+    kernel = of_kernels or name in KERNEL_FILES
     rules = EVERYWHERE + (KERNEL if kernel else []) + ([] if name in LIBRARY_FILES else NO_LIBRARY)
     result = []
     for number, line in enumerate(without_comments(path.read_text(encoding="utf-8")).splitlines(), 1):
@@ -90,7 +93,7 @@ def main() -> int:
         for path in (source / folder).rglob("*")
         if path.suffix in (".h", ".inl", ".cc", ".cu")
     )
-    missing = [name for name in sorted(HOST_HEADERS | LIBRARY_FILES) if not (source / name).is_file()]
+    missing = [name for name in sorted(HOST_HEADERS | LIBRARY_FILES | KERNEL_FILES) if not (source / name).is_file()]
     found = [f"{name}: listed here, but there is no such file" for name in missing]
     found += [line for path in files for line in findings(path, path.relative_to(source).as_posix())]
     print("\n".join(found) if found else f"kernel rules: {len(files)} files, nothing found")

@@ -7,6 +7,8 @@
 namespace nb = nanobind;
 
 NB_MODULE(_core, m) {
+  // Arrays of a batch that PyTorch or JAX still hold at exit are no leak.
+  nb::set_leak_warnings(false);
   m.doc() = "C++ core of stickslip. Use the names of the package `stickslip`; these may change.";
 
   nb::register_exception_translator([](const std::exception_ptr& p, void*) {

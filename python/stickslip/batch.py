@@ -42,7 +42,8 @@ class Batch:
     world: gives robot, gravity, ground, materials, options, gains, forces and present state; it is not touched, and may go.
     num_envs: environments, at least 1.
     dtype: "float32" (fastest) or "float64" (the bits of a World).
-    num_threads: 0 for one per core that this process may use. pin_threads: bind each to a core.
+    num_threads: 0 for one per core that this process may use. pin_threads: bind each but the calling one
+        to a core.
     instruction_set: "avx512", "avx2" or "neon"; None for what STICKSLIP_ISA says, else the widest that the machine has.
 
     ValueError says what a batch cannot hold (no robot or several, a method other than "auto", ...) and what to do.

@@ -337,8 +337,9 @@ void ContactStage<S>::solve(const StepSettings& settings, Mask<S> live, S* warm,
   for (int k = 0; k < 3 * tables_->num_points; ++k) warm[k] = select(live, zero, warm[k]);
   for (int i = 0; i < count_; ++i)
     for (int r = 0; r < 3; ++r) {
-      S& w = warm[3 * active_[i].id + r];
-      w = select(live & active_[i].active, problem_.impulse(i)[r] / h, w);
+      S &impulse = problem_.impulse(i)[r], &w = warm[3 * active_[i].id + r];
+      impulse = impulse + zero;  // a zero is +0, whichever way it came about
+      w = select(live & active_[i].active, impulse / h, w);
     }
 }
 

@@ -23,10 +23,15 @@ template <class S>
 STICKSLIP_INLINE Mask<S> is_finite(S sum_of_sizes) {
   return sum_of_sizes <= constant<S>(sizeof(Value<S>) == 4 ? 3.4028234e38 : 1.7976931348623157e308);
 }
+/// Sums of sizes in four chains, to end in `is_finite`: only whether it is finite counts.
 template <class S>
 STICKSLIP_INLINE S sum_of_sizes(const S* values, int n, S sum) {
-  for (int k = 0; k < n; ++k) sum = sum + abs(values[k]);
-  return sum;
+  S part[4] = {sum, constant<S>(0), constant<S>(0), constant<S>(0)};
+  int k = 0;
+  for (; k + 4 <= n; k += 4)
+    for (int j = 0; j < 4; ++j) part[j] = part[j] + abs(values[k + j]);
+  for (; k < n; ++k) part[0] = part[0] + abs(values[k]);
+  return (part[0] + part[1]) + (part[2] + part[3]);
 }
 
 }  // namespace stickslip::step::inline STICKSLIP_KERNELS

@@ -397,6 +397,22 @@ def test_order_of_environments_changes_no_bit(dtype: str) -> None:
 
 
 @pytest.mark.parametrize("dtype", NUMBERS)
+def test_neighbor_that_needs_substeps_changes_nobodys_contacts(dtype: str) -> None:
+    batch, calm = (ss.Batch(anymal(time_step=5e-3), 16, dtype, 1) for _ in range(2))
+    for b in (batch, calm):
+        b.step(200)
+    q, u = batch.q[3].copy(), batch.u[3].copy()
+    q[2], u[3] = 5.0, 200.0  # in the air, and so fast that its step is cut
+    batch.reset([3], q=q, u=u)
+    others = np.arange(16) != 3
+    for _ in range(10):
+        batch.step()
+        calm.step()
+        assert_same_bits(batch, calm, ("q", "u", *OUTPUTS), others)
+        assert batch.contact_active[others].any(axis=1).all() and not batch.contact_active[3].any()
+
+
+@pytest.mark.parametrize("dtype", NUMBERS)
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_instruction_sets_change_no_bit(dtype: str, integrator: str, monkeypatch) -> None:
     widest = scattered(17, dtype, integrator=integrator)

@@ -33,9 +33,9 @@ static void prepare(void* workspace, const PackScene& scene) {
   lanes->lay_out(arena, scene);
 }
 
-static std::uint32_t step_pack(void* workspace, const EnvArrays& arrays,
-                               const PackInertias& inertias, const step::StepSettings& settings,
-                               long first, long num_envs, int steps) {
+static StatusBits step_pack(void* workspace, const EnvArrays& arrays, const PackInertias& inertias,
+                            const step::StepSettings& settings, long first, long num_envs,
+                            int steps) {
   auto& lanes = *static_cast<PackLanes<Lanes>*>(workspace);
   lanes.load(arrays, first, num_envs);
   lanes.use_inertias(inertias);

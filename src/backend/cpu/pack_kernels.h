@@ -8,6 +8,9 @@
 
 namespace stickslip::backend {
 
+using StatusBits = std::uint32_t;  // StepStatus
+using Flag = std::uint8_t;         // 0 or 1
+
 /// A robot as kernels of one pack shape see it. T: float or double.
 struct PackScene {
   const step::RobotTables* tables;
@@ -27,8 +30,8 @@ struct Parameter {
 /// The arrays of a batch: T unless said, (environments, ...) row-major, padded to whole packs.
 struct EnvArrays {
   void *q, *u, *generalized_force, *pd_target, *contact_impulse, *residual;
-  std::uint8_t* contact_active;
-  std::uint32_t* status;
+  Flag* contact_active;
+  StatusBits* status;
   double* time;
   Parameter kp, kd, friction, gravity;
   Parameter external_wrench;  // optional
@@ -68,8 +71,8 @@ struct PackKernels {
   void (*prepare)(void* workspace, const PackScene&);
   /// Steps the environments of a pack; `first` is a multiple of the width. The same workspace may
   /// serve any pack. Returns the status bits of its environments below `num_envs`, or-ed.
-  std::uint32_t (*step)(void* workspace, const EnvArrays&, const PackInertias&,
-                        const step::StepSettings&, long first, long num_envs, int steps);
+  StatusBits (*step)(void* workspace, const EnvArrays&, const PackInertias&,
+                     const step::StepSettings&, long first, long num_envs, int steps);
 };
 
 }  // namespace stickslip::backend

@@ -25,8 +25,8 @@ class PackLanes {
   /// After each step of the robot.
   void count_step();
   /// Status bits of the environments below num_envs, or-ed.
-  std::uint32_t store(const EnvArrays& arrays, const step::StepSettings& settings, long first,
-                      long num_envs);
+  StatusBits store(const EnvArrays& arrays, const step::StepSettings& settings, long first,
+                   long num_envs);
 
  private:
   void lay_out_tree(contact::Arena& arena, const PackScene& scene);
@@ -52,8 +52,9 @@ class PackLanes {
   S *last_q_, *last_u_, *scratch_;
   Spatial<dynamics::Wide<S>>* wrenches_;
   Spatial<S> base_wrench_;
-  Mask<S> set_aside_, unconverged_, non_finite_;
-  S residual_, steps_done_;
+  Mask<S> set_aside_, fresh_, unconverged_, non_finite_;
+  S residual_, steps_failed_;
+  long steps_ = 0;
   int used_ = kWidth;  // lanes with an environment
 };
 
@@ -127,11 +128,13 @@ void PackLanes<S>::load(const EnvArrays& arrays, long first, long num_envs) {
   repeat(&s.pending_gravity, 1), repeat(&fresh, 1);
   s.fresh = fresh > constant<S>(0.5);
   check_state();
+  fresh_ = s.fresh;
   load_control(arrays, first);
   robot_.prepared_step = constant<S>(0);
   robot_.contacts.forget();
   unconverged_ = non_finite_ = step::none<S>();
-  residual_ = steps_done_ = constant<S>(0);
+  residual_ = steps_failed_ = constant<S>(0);
+  steps_ = 0;
 }
 
 /// Lanes whose state is not the one that the last step left start afresh, without warm start and
@@ -177,6 +180,9 @@ void PackLanes<S>::load_control(const EnvArrays& arrays, long first) {
   load_parameter(arrays.kd, t.num_joints, first, kd_);
   load_parameter(arrays.friction, t.num_shapes, first, friction_);
   load_parameter(arrays.gravity, 3, first, gravity_);
+  // Whatever else is not finite shows in the velocities; a friction that is none would only open
+  // the contacts.
+  for (int k = 0; k < t.num_shapes; ++k) set_aside_ = set_aside_ | !(friction_[k] >= zero);
   load_rows(rows(arrays.pd_target, t.num_joints, first), t.num_joints, target_);
   repeat(target_, t.num_joints);
   c.gravity = {gravity_[0], gravity_[1], gravity_[2]};
@@ -244,12 +250,14 @@ void PackLanes<S>::count_step() {
   unconverged_ = unconverged_ | i.unconverged;
   non_finite_ = non_finite_ | i.non_finite;
   residual_ = max(residual_, i.residual);
-  steps_done_ = steps_done_ + select(i.non_finite, constant<S>(0), constant<S>(1));
+  if (any(i.non_finite))
+    steps_failed_ = steps_failed_ + select(i.non_finite, constant<S>(1), constant<S>(0));
+  ++steps_;
 }
 
 template <class S>
-std::uint32_t PackLanes<S>::store(const EnvArrays& arrays, const step::StepSettings& settings,
-                                  long first, long num_envs) {
+StatusBits PackLanes<S>::store(const EnvArrays& arrays, const step::StepSettings& settings,
+                               long first, long num_envs) {
   const step::RobotTables& t = *scene_.tables;
   const PackHistory h(t);
   step::LaneState<S>& s = robot_.state;
@@ -259,10 +267,15 @@ std::uint32_t PackLanes<S>::store(const EnvArrays& arrays, const step::StepSetti
   if (any(set_aside_)) {
     step::copy_where(set_aside_, last_q_, t.nq, s.q);
     step::copy_where(set_aside_, last_u_, t.nu, s.u);
-    step::copy_where(set_aside_, past + h.impulse, 3 * t.num_points, s.impulse);
+    const Mask<S> old = set_aside_ & !fresh_;
+    for (int k = 0; k < 3 * t.num_points; ++k) {
+      s.impulse[k] = select(set_aside_, zero, s.impulse[k]);
+      s.impulse[k] = select(old, past[h.impulse + k], s.impulse[k]);
+    }
     step::copy_where(set_aside_, past + h.drift, t.nu, s.drift_acceleration);
-    s.pending_gravity = select(set_aside_, past[h.pending], s.pending_gravity);
-    s.fresh = (s.fresh & !set_aside_) | (set_aside_ & (past[h.fresh] > constant<S>(0.5)));
+    s.pending_gravity = select(set_aside_, zero, s.pending_gravity);
+    s.pending_gravity = select(old, past[h.pending], s.pending_gravity);
+    s.fresh = (s.fresh & !set_aside_) | (set_aside_ & fresh_);
     step::record_contacts(robot_, set_aside_, true);
   }
   store_rows(s.q, t.nq, rows(arrays.q, t.nq, first));
@@ -276,23 +289,23 @@ std::uint32_t PackLanes<S>::store(const EnvArrays& arrays, const step::StepSetti
 
   const step::LaneContacts<S>& last = robot_.last_contacts;
   store_rows(last.impulse, 3 * t.num_points, rows(arrays.contact_impulse, 3 * t.num_points, first));
-  std::uint8_t* active = arrays.contact_active + first * t.num_points;
+  Flag* active = arrays.contact_active + first * t.num_points;
   for (int k = 0; k < t.num_points; ++k)
     for (int lane = 0; lane < kWidth; ++lane)
       active[long(lane) * t.num_points + k] = get_lane(last.active[k], lane);
 
   const Mask<S> non_finite = non_finite_ | set_aside_, unconverged = unconverged_ & !set_aside_;
-  std::uint32_t bits = 0;
+  StatusBits bits = 0;
   for (int lane = 0; lane < kWidth; ++lane) {
     const bool dropped = get_lane(set_aside_, lane);
-    const std::uint32_t status =
+    const StatusBits status =
         (get_lane(unconverged, lane) ? 1u : 0u) | (get_lane(non_finite, lane) ? 2u : 0u);
     arrays.status[first + lane] = status;
     if (first + lane < num_envs) bits |= status;
     static_cast<T*>(arrays.residual)[first + lane] = dropped ? T(0) : get_lane(residual_, lane);
     // Step by step, as a world counts.
-    for (T done = get_lane(steps_done_, lane); done > 0 && !dropped; done = done - 1)
-      arrays.time[first + lane] += settings.time_step;
+    const long done = dropped ? 0 : steps_ - long(get_lane(steps_failed_, lane));
+    for (long k = 0; k < done; ++k) arrays.time[first + lane] += settings.time_step;
   }
   return bits;
 }
