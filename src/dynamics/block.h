@@ -12,42 +12,38 @@ namespace stickslip::dynamics::inline STICKSLIP_KERNELS {
 
 inline constexpr int kBlock = 3;
 
-/// Joints in the block at a chain's first joint.
-STICKSLIP_INLINE int first_block(int length) { return (length - 1) % kBlock + 1; }
-
 template <int N>
 struct BlockSize {
   static constexpr int value = N;
 };
 
-/// f(BlockSize<size>).
+/// f(first slot, BlockSize).
 template <class F>
-STICKSLIP_INLINE void with_block_size(int size, const F& f) {
+STICKSLIP_INLINE void with_block_size(int slot, int size, const F& f) {
   if (size == 3)
-    f(BlockSize<3>{});
+    f(slot, BlockSize<3>{});
   else if (size == 2)
-    f(BlockSize<2>{});
+    f(slot, BlockSize<2>{});
   else
-    f(BlockSize<1>{});
+    f(slot, BlockSize<1>{});
 }
 
-/// Calls f(first slot, BlockSize) for the blocks of a chain, from the base to the tip.
+/// f(first slot, BlockSize) for the blocks of a chain, from the base to the tip.
 template <class F>
 STICKSLIP_INLINE void blocks_outward(const Bundle& b, const F& f) {
   const int end = b.first_slot + b.length;
-  for (int slot = b.first_slot, size = first_block(b.length); slot < end;
+  for (int slot = b.first_slot, size = (b.length - 1) % kBlock + 1; slot < end;
        slot += size, size = kBlock)
-    with_block_size(size, [&](auto n) STICKSLIP_LAMBDA { f(slot, n); });
+    with_block_size(slot, size, f);
 }
 
-/// Calls f(first slot, BlockSize) for the blocks of a chain, from the tip to the base.
+/// f(first slot, BlockSize) for the block of a chain that ends before `slot`, which becomes the
+/// block's first.
 template <class F>
-STICKSLIP_INLINE void blocks_inward(const Bundle& b, const F& f) {
-  for (int end = b.first_slot + b.length; end > b.first_slot;) {
-    const int size = end - b.first_slot < kBlock ? end - b.first_slot : kBlock;
-    end -= size;
-    with_block_size(size, [&](auto n) STICKSLIP_LAMBDA { f(end, n); });
-  }
+STICKSLIP_INLINE void next_block_inward(const Bundle& b, int& slot, const F& f) {
+  const int left = slot - b.first_slot, size = left < kBlock ? left : kBlock;
+  slot = slot - size;
+  with_block_size(slot, size, f);
 }
 
 /// Diagonal of L from D, and the row U = F / sqrt(D).
@@ -177,9 +173,8 @@ STICKSLIP_INLINE void multiply_block(Tree<S>& t, int slot, const S* rates,
     link[1].x = madd(link[1].root, r1, madd(link[1].inner[0], r0, dot(link[1].arm, v)));
     if constexpr (N > 2) {
       const W r2 = load_lanes(rates, t.slots[slot + 2].joint);
-      link[2].x = madd(
-          link[2].root, r2,
-          madd(link[2].inner[0], r1, madd(link[2].inner[1], r0, dot(link[2].arm, v))));
+      link[2].x = madd(link[2].root, r2,
+                       madd(link[2].inner[0], r1, madd(link[2].inner[1], r0, dot(link[2].arm, v))));
     }
   }
 }

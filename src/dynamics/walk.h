@@ -141,18 +141,21 @@ void chain_multiply(Tree<S>& t, const Bundle& b, const Vec3<S>& translation, con
 template <class S>
 void chain_factor(Tree<S>& t, const Bundle& b, const S* diagonal) {
   using W = Wide<S>;
-  const int last = b.first_slot + b.length - 1;
   ArticulatedInertia<W> rest;
-  blocks_inward(b, [&](int slot, auto n) STICKSLIP_LAMBDA {
+  int slot = b.first_slot + b.length;
+  next_block_inward(b, slot, [&](int first, auto n) STICKSLIP_LAMBDA {
     constexpr int N = decltype(n)::value;
-    const int end = slot + N - 1;
-    if (end != last)
-      rest = factor_block<N>(t, slot, rest + t.links[end].inertia, diagonal);
-    else if (b.has_children)
-      rest = factor_block<N>(t, slot, t.links[end].from_children + t.links[end].inertia, diagonal);
+    const LinkState<W>& last = t.links[first + N - 1];
+    if (b.has_children)
+      rest = factor_block<N>(t, first, last.from_children + last.inertia, diagonal);
     else
-      rest = factor_block<N>(t, slot, t.links[end].inertia, diagonal);
+      rest = factor_block<N>(t, first, last.inertia, diagonal);
   });
+  while (slot > b.first_slot)
+    next_block_inward(b, slot, [&](int first, auto n) STICKSLIP_LAMBDA {
+      constexpr int N = decltype(n)::value;
+      rest = factor_block<N>(t, first, rest + t.links[first + N - 1].inertia, diagonal);
+    });
   add_to_parents<S, ArticulatedInertia>(t, b, rest, t.base.articulated,
                                         &LinkState<W>::from_children);
 }
@@ -162,9 +165,10 @@ void chain_solve_transposed(Tree<S>& t, const Bundle& b, const S* tau, Spatial<S
   using W = Wide<S>;
   Spatial<W> f = zero_spatial<W>();
   if (b.has_children) f = t.links[b.first_slot + b.length - 1].force_from_children;
-  blocks_inward(b, [&](int slot, auto n) STICKSLIP_LAMBDA {
-    solve_transposed_block<decltype(n)::value, kLinkForces>(t, slot, tau, f);
-  });
+  for (int slot = b.first_slot + b.length; slot > b.first_slot;)
+    next_block_inward(b, slot, [&](int first, auto n) STICKSLIP_LAMBDA {
+      solve_transposed_block<decltype(n)::value, kLinkForces>(t, first, tau, f);
+    });
   add_to_parents<S, Spatial>(t, b, f, on_base, &LinkState<W>::force_from_children);
 }
 

@@ -77,8 +77,8 @@ template <class S>
 STICKSLIP_INLINE void change_field(const Vec3<S>& w, const Vec3<S>& alpha, const Vec3<S>& p,
                                    Mat3<S>& field, Vec3<S>& a) {
   const S yy = w.y * w.y, zz = w.z * w.z;
-  const auto change_row = [&](S& x, S& y, S& z, const Vec3<S>& row, S& sum)
-                              __attribute__((always_inline)) {
+  const auto change_row = [&](S& x, S& y, S& z, const Vec3<S>& row,
+                              S& sum) __attribute__((always_inline)) {
     sum = madd(z - row.z, p.z, madd(y - row.y, p.y, madd(x - row.x, p.x, sum)));
     x = row.x, y = row.y, z = row.z;
   };
@@ -166,8 +166,8 @@ STICKSLIP_INLINE Spatial<S> operator*(const RigidInertia<S>& a, const Spatial<S>
                       nmadd(h.x, w.y, h.y * w.x)};
   return {a.rot * w + moment, force + l * a.mass};
 }
-/// I - sum of u u^T: what is left of the inertia when joints with these U are free to move. Number by
-/// number, so that there are few values to hold.
+/// I - sum of u u^T: what is left of the inertia when joints with these U are free to move. Number
+/// by number, so that there are few values to hold.
 template <class S, class... U>
 STICKSLIP_INLINE ArticulatedInertia<S> without(const ArticulatedInertia<S>& i, const U&... u) {
   ArticulatedInertia<S> r = i;

@@ -18,8 +18,10 @@ namespace {
 /// Robots of one model in one random state per lane of S.
 template <class S>
 struct Robots {
+  using W = Wide<S>;
   TreeMemory<S> memory;
   Tree<S>& t;
+  std::vector<Spatial<W>> wrenches;
   std::vector<S> q, rates, extra, joints;
   S quaternion[4], base[6] = {};
   Vec3<S> w, gravity;
@@ -29,6 +31,7 @@ struct Robots {
       : memory(model), t(memory.tree()), gravity{S(0), S(0), constant<S>(-9.81)} {
     const int n = model.num_joints();
     q.resize(n), rates.resize(n), extra.resize(n), joints.resize(n);
+    wrenches.assign(t.num_slots, {{W(3), W(2), W(1)}, {W(6), W(5), W(4)}});
     const auto load = [&](S& to, int k) {
       for (int lane = 0; lane < ScalarTraits<S>::kWidth; ++lane)
         set_lane(to, lane, static_cast<Value<S>>(states[lane][k]));
@@ -40,8 +43,8 @@ struct Robots {
   }
 
   WalkInput<S> input() const {
-    return {quaternion,   q.data(),     w,     w,       rates.data(), gravity,
-            extra.data(), rates.data(), &push, nullptr, nullptr};
+    return {quaternion,   q.data(),     w,     w,     rates.data(),   gravity,
+            extra.data(), rates.data(), &push, &push, wrenches.data()};
   }
   const Spatial<S> push{{S(1), S(2), S(3)}, {S(4), S(5), S(6)}};  // on the base
 };
@@ -69,7 +72,8 @@ std::vector<S> run_kernels(const Model& model, const std::vector<std::vector<dou
   std::vector<LinkIndex> path(model.num_joints());
   std::vector<Row3<S>> rows(model.num_joints());
   for (const LinkIndex& link : memory.layout().link_of_body) {
-    ContactRows<S> r{0, path.data(), rows.data(), {}};
+    Row3<S> base[6];
+    ContactRows<S> r{0, path.data(), rows.data(), base};
     const S half = constant<S>(0.5), o = constant<S>(0);
     const Vec3<S> point = point_position(t, link, Vec3<S>{half, o, half});
     compute_contact_rows(t, link, point, r);
@@ -98,15 +102,14 @@ std::vector<double> random_state(const Model& model, unsigned seed) {
 
 std::vector<ModelPtr> robots() {
   using testing::random_robot;
-  return {random_robot(1, 12, 4, BaseType::kFloating),
-          random_robot(2, 13, 4, BaseType::kFloating),
-          random_robot(3, 15, 0, BaseType::kFloating),
-          random_robot(4, 7, 1, BaseType::kFixed),
-          random_robot(5, 20, 0, BaseType::kFixed),
-          random_robot(6, 30, 0, BaseType::kFloating),
-          random_robot(7, 1, 1, BaseType::kFixed),
-          random_robot(8, 18, 6, BaseType::kFloating),
-          testing::random_humanoid(9)};
+  return {random_robot(1, 12, 4, BaseType::kFloating), random_robot(2, 13, 4, BaseType::kFloating),
+          random_robot(3, 15, 0, BaseType::kFloating), random_robot(4, 7, 1, BaseType::kFixed),
+          random_robot(5, 20, 0, BaseType::kFixed), random_robot(6, 30, 0, BaseType::kFloating),
+          random_robot(7, 1, 1, BaseType::kFixed), random_robot(8, 18, 6, BaseType::kFloating),
+          testing::random_humanoid(9),
+          // Equal chains of which one carries others; chains of every length around a block.
+          testing::random_tree(10, {-1, 0, -1, 2, 1, 4, 1, 6, 7, -1, 9, -1, 11, 12, 13, 14}, true,
+                               BaseType::kFloating)};
 }
 
 /// All numbers that passes leave in a tree and its links.
@@ -116,7 +119,7 @@ std::vector<Value<S>> numbers(Robots<S>& r, bool with_composite) {
   std::vector<Value<S>> out;
   const auto add = [&](const auto& x) {
     const auto* from = reinterpret_cast<const Value<S>*>(&x);
-    out.insert(out.end(), from, from + sizeof(x) / (sizeof(Value<S>)));
+    out.insert(out.end(), from, from + int(sizeof x) / int(sizeof(Value<S>)));
   };
   for (const S& x : r.joints) add(x);
   add(r.base), add(r.t.base);
@@ -140,6 +143,10 @@ void compare_fused() {
     compute_bias(a, in.angular_velocity, in.rates, in.gravity);
     factor_mass_matrix(a, in.diagonal);
     a.base.force = a.base.force + *in.base_force;
+    a.base.force = a.base.force + force_of_wrench(*in.base_wrench, a.base.inertia);
+    for (int slot = 0; slot < a.num_slots; ++slot)
+      a.links[slot].force =
+          a.links[slot].force + force_of_wrench(in.wrenches[slot], a.links[slot].inertia);
     solve_lower_transposed(a, in.tau, LinkForces::kAll);
     a.base.force = {}, f.base.force = {};
     compute_free_motion(f, in);
