@@ -25,6 +25,7 @@ from stickslip.world import World
 __all__ = ["Batch", "ContactPoint"]
 
 Array = NDArray[Any]
+_PARAMETERS = ("kp", "kd", "friction", "gravity", "body_mass", "body_com", "body_inertia")
 _PRECISIONS = ("float32", "float64")
 
 
@@ -334,6 +335,12 @@ class Batch:
     @body_inertia.setter
     def body_inertia(self, value: ArrayLike) -> None:
         self._assign("body_inertia", value, (len(self._bodies.names), 6), self._check_inertias)
+
+    def has_own(self, name: str) -> bool:
+        """Whether a parameter, such as "kp", is each environment's own, because it was read or assigned."""
+        if name not in _PARAMETERS:
+            raise ValueError(f"name is {name!r}; choose one of {', '.join(map(repr, _PARAMETERS))}")
+        return name in self._views
 
     # Running
 

@@ -335,6 +335,14 @@ def test_masks_of_integers_are_recognized(batch: ss.Batch) -> None:
         batch.reset([1, 1])
 
 
+def test_parameters_are_own_once_they_are_used(batch: ss.Batch) -> None:
+    assert not batch.has_own("kp")
+    batch.kp = 3.0
+    assert batch.has_own("kp") and not batch.has_own("kd")
+    with pytest.raises(ValueError, match="name is 'pd_target'; choose one of 'kp', 'kd'"):
+        batch.has_own("pd_target")
+
+
 def test_flagged_means_any_bit_unless_told(batch: ss.Batch) -> None:
     batch.generalized_force[2] = np.nan
     batch.step()
