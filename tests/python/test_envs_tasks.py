@@ -105,7 +105,9 @@ def test_terms_may_be_lists() -> None:
 
 
 def test_unknown_arguments_are_named_beside_those_of_the_task() -> None:
-    with pytest.raises(TypeError, match=r"Falling has no argument foo; it takes num_envs, .*pin_threads, instruction_set"):
+    with pytest.raises(
+        TypeError, match=r"Falling has no argument foo; it takes num_envs, .*pin_threads, instruction_set"
+    ):
         Falling(3, foo=1)
 
 

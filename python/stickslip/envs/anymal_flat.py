@@ -83,7 +83,9 @@ class AnymalFlat(VectorTask):
             raise TypeError(f"commands is a {type(c.commands).__name__}; a stickslip.envs.commands.Commands is wanted")
         c.commands.check()
         if not isinstance(c.pushes, (Pushes, type(None))):
-            raise TypeError(f"pushes is a {type(c.pushes).__name__}; a stickslip.envs.randomization.Pushes or None is wanted")
+            raise TypeError(
+                f"pushes is a {type(c.pushes).__name__}; a stickslip.envs.randomization.Pushes or None is wanted"
+            )
         if c.pushes is not None:
             c.pushes.check()
         self.time_step, self.decimation, self.episode_seconds = c.time_step, c.decimation, c.episode_seconds
@@ -145,7 +147,7 @@ class AnymalFlat(VectorTask):
 
     @property
     def commands(self) -> Array:
-        """(num_envs, 3) velocity forward, to the left [m/s], yaw rate [rad/s]; write here to steer."""
+        """(num_envs, 3) velocity forward, to the left [m/s], yaw rate [rad/s]; write here to steer until the next draw."""
         return self.state.commands
 
     # Episodes
