@@ -63,10 +63,7 @@ def push(task: AnymalFlat, envs: Indices, speed: float = 0.5) -> None:
 class Pushes:
     """When and how robots are pushed."""
 
-    seconds: tuple[float, float] = (
-        10.0,
-        15.0,
-    )  #: from the beginning of an episode or the last push on [s]; infinite: never
+    seconds: tuple[float, float] = (10.0, 15.0)  #: since the beginning or the last push [s]; infinite: never
     function: Randomization = push
 
     def check(self) -> None:

@@ -35,7 +35,8 @@ class VectorTask(VectorEnv):
     """A Gymnasium vector environment on one `stickslip.Batch`. Arrays have one row per environment.
 
     num_envs: environments. autoreset_mode: a `gymnasium.vector.AutoresetMode`, or its value ("NextStep", "SameStep",
-    "Disabled"). max_episode_steps: instead of what `episode_seconds` gives; a single environment has the latter. dtype, num_threads, batch_options: of the `Batch`.
+    "Disabled"). max_episode_steps: instead of what `episode_seconds` gives; a single environment has the latter.
+    dtype, num_threads, batch_options: of the `Batch`.
 
     Attributes for the methods of a task: `batch`, `world` and `robot` (which the batch was made of), `random` (one stream per
     environment), `actions` and `previous_actions` (num_envs, action_size), `episode_steps` (num_envs,), `step_seconds`.
