@@ -231,7 +231,7 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
       min(madd(relative * relative, fastest, absolute * absolute), allowed * allowed);
   // False for NaN, and where products of block entries would overflow.
   const auto finite = sum < constant<S>(sizeof(Value<S>) == 4 ? 1e14 : 1e30);
-  auto open = iterate<M, kMaxDissipation>(p, finite, tolerance_squared, o, info);
+  iterate<M, kMaxDissipation>(p, finite, tolerance_squared, o, info);
   S worst = certify<M, kMaxDissipation>(p);
   auto bad = finite & !(worst <= allowed);
   if (any(bad)) {
@@ -250,7 +250,6 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
       worst = select(bad, certify<M, kMaxDissipation>(p), worst);
     }
   }
-  (void)open;
   info.residual = worst;
   info.allowed = allowed;
   info.converged = finite & (worst <= allowed);
