@@ -13,8 +13,9 @@ import argparse
 import subprocess
 import sys
 
-# Undefined: the compiler itself calls these.
+# Undefined: the compiler itself calls these; unwinding with sanitizers only.
 COMPILER_CALLS = {"memcpy", "memmove", "memset", "memcmp", "__stack_chk_fail", "_GLOBAL_OFFSET_TABLE_"}
+UNWINDING = {"_Unwind_Resume", "__gxx_personality_v0"}
 SANITIZERS = ("__asan_", "__ubsan_", "__tsan_")
 
 
@@ -34,7 +35,9 @@ def is_allowed(kind: str, name: str, instruction_set: str) -> bool:
     if f"{len(instruction_set)}{instruction_set}" in name:  # as a namespace in a mangled name
         return True
     if kind in "Uw":
-        return name.lstrip("_") in {call.lstrip("_") for call in COMPILER_CALLS} or name.startswith(SANITIZERS)
+        return name in COMPILER_CALLS | UNWINDING or name.startswith(SANITIZERS)
+    if kind == "V":  # a pointer, no code
+        return name in {f"DW.ref.{call}" for call in UNWINDING}
     # The table of functions that all of it is for.
     return kind in "DRB" and f"pack_{instruction_set}_" in name
 
