@@ -36,13 +36,11 @@ std::uint64_t add(std::uint64_t hash, std::span<const T> values) {
   return hash;
 }
 
-/// q, u and impulses of an environment; a zero impulse has no sign.
+/// q, u and impulses of an environment.
 template <class T>
 std::uint64_t add_environment(std::uint64_t hash, std::span<const T> q, std::span<const T> u,
                               std::span<const T> impulse) {
-  std::vector<T> plain(impulse.begin(), impulse.end());
-  for (T& x : plain) x += 0;
-  return add<T>(add<T>(add<T>(hash, q), u), plain);
+  return add<T>(add<T>(add<T>(hash, q), u), impulse);
 }
 
 template <class T>

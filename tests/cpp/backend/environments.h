@@ -58,29 +58,18 @@ inline size_t size_of(NumberType type) {
   return type == NumberType::kFloat64 ? 8 : type == NumberType::kUint8 ? 1 : 4;
 }
 
-/// Environment `a` of one batch has every bit of environment `b` of another, but for the sign of an
-/// impulse that is zero.
+/// Environment `a` of one batch has every bit of environment `b` of another.
 inline bool same_environment(Batch& one, int a, Batch& two, int b) {
   for (const BatchField field : kOutputs) {
     const BatchArray x = one.array(field), y = two.array(field);
-    if (x.type != y.type) return false;
-    const size_t n = row<char>(x, 0).size(), bytes = n * size_of(x.type);
-    const char *from = static_cast<char*>(x.data) + static_cast<size_t>(a) * bytes,
-               *with = static_cast<char*>(y.data) + static_cast<size_t>(b) * bytes;
-    if (field == BatchField::kContactImpulse) {
-      const bool same = x.type == NumberType::kFloat32
-                            ? std::equal(row<float>(x, a).begin(), row<float>(x, a).end(),
-                                         row<float>(y, b).begin())
-                            : std::equal(row<double>(x, a).begin(), row<double>(x, a).end(),
-                                         row<double>(y, b).begin());
-      if (!same) return false;
-    } else if (std::memcmp(from, with, bytes) != 0) {
+    const size_t bytes = row<char>(x, 0).size() * size_of(x.type);
+    if (x.type != y.type ||
+        std::memcmp(static_cast<char*>(x.data) + static_cast<size_t>(a) * bytes,
+                    static_cast<char*>(y.data) + static_cast<size_t>(b) * bytes, bytes) != 0)
       return false;
-    }
   }
   return true;
 }
-
 inline bool all_same(Batch& one, Batch& two) {
   bool same = one.num_envs() == two.num_envs();
   for (int env = 0; env < one.num_envs() && same; ++env)
@@ -201,7 +190,7 @@ class BatchAndWorlds {
     if (!same_bits(row<double>(of(), BatchField::kU, env), r.u())) return "u";
     if (!std::equal(active.begin(), active.end(), active_here.begin())) return "contact_active";
     const auto impulse_here = row<double>(of(), BatchField::kContactImpulse, env);
-    if (!std::equal(impulse.begin(), impulse.end(), impulse_here.begin())) return "contact_impulse";
+    if (!same_bits(impulse_here, impulse)) return "contact_impulse";
     if (status(of(), env) != info.status) return "status";
     if (!same_bits({&residual, 1}, {&info.residual, 1})) return "residual";
     if (!same_bits({&time, 1}, {&time_[env], 1})) return "time";

@@ -114,7 +114,7 @@ class TwinWorld : public World {
     for (const Contact& c : r.contacts())
       for (size_t k = 0; k < points.size(); ++k)
         if (points[k].shape == c.shape && points[k].point == c.point &&
-            (!active[k] || !std::equal(c.impulse.begin(), c.impulse.end(), &impulse[3 * k])))
+            (!active[k] || !same_bits(c.impulse, impulse.subspan(3 * k, 3))))
           return "contact impulse";
     return nullptr;
   }
