@@ -284,10 +284,8 @@ def replay(policy: MlpPolicy, output: Path, frames_per_second: int = 10) -> None
             shots.append(Shot.of(still(task), distance=2.8, look_up=0.32))
     with ThreadPoolExecutor() as pool:
         frames = list(pool.map(lambda shot: Image.fromarray(render(shot.parts, shot.camera, 320, 213)), shots))
-    colors = strip(frames[::8]).quantize(256, Image.Quantize.FASTOCTREE)  # the same for all, or they would flicker
-    animation = [frame.quantize(palette=colors, dither=Image.Dither.NONE) for frame in frames]
-    every_ms = 1000 // frames_per_second
-    animation[0].save(output / "walk.gif", save_all=True, append_images=animation[1:], duration=every_ms, loop=0)
+    timing = {"duration": 1000 // frames_per_second, "loop": 0}
+    frames[0].save(output / "walk.webp", save_all=True, append_images=frames[1:], quality=50, method=4, **timing)
     chosen = np.linspace(0, len(frames) - 1, 4).round().astype(int)
     strip([frames[k] for k in chosen], [f"{k / frames_per_second:.1f} s" for k in chosen]).save(output / "walk.png")
 
@@ -328,7 +326,7 @@ def main() -> None:
         f"yaw rate error {result['yaw_error']:.3f} rad/s, {result['fallen']:.1%} fall"
     )
     replay(policy, args.output)
-    print(f"pictures: {args.output / 'walk.gif'}, {args.output / 'walk.png'}")
+    print(f"pictures: {args.output / 'walk.webp'}, {args.output / 'walk.png'}")
 
 
 if __name__ == "__main__":

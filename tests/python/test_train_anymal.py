@@ -51,7 +51,7 @@ def test_replay_draws_without_torch(example: dict[str, Any], policy: Any, tmp_pa
     from PIL import Image
 
     example["replay"](policy, tmp_path, frames_per_second=1)
-    with Image.open(tmp_path / "walk.gif") as animation:
+    with Image.open(tmp_path / "walk.webp") as animation:
         assert animation.n_frames == round(sum(seconds for seconds, _ in example["SHOW"]))
     with Image.open(tmp_path / "walk.png") as picture:
         assert picture.width > 4 * 320
