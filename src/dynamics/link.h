@@ -36,17 +36,16 @@ STICKSLIP_INLINE void place_inertia(const LinkInertia<K>& c, LinkState<W>& link)
         link.inertia);
 }
 
-/// (D6): velocity, acceleration and A of the parent become those of the link. Returns minus the
+/// (D6): velocity and acceleration of the parent become those of the link. Returns minus the
 /// inertial force.
 template <class W>
-STICKSLIP_INLINE Spatial<W> bias_of_link(const LinkState<W>& link, bool prismatic, W rate,
-                                         Spatial<W>& v, Spatial<W>& a, Mat3<W>& field) {
-  const Vec3<W> turn = link.axis.ang * rate;
-  v = {v.ang + turn, madd(link.axis.lin, rate, v.lin)};
-  a.ang = cross(v.ang, turn, a.ang);
-  change_field(v.ang, a.ang, link.position, field, a.lin);
-  if (prismatic) a.lin = cross(v.ang, link.axis.lin * (rate + rate), a.lin);
-  return -inertial_force(link.inertia, v.ang, a, field);
+STICKSLIP_INLINE Spatial<W> bias_of_link(const LinkState<W>& link, W rate, Spatial<W>& v,
+                                         Spatial<W>& a) {
+  const Spatial<W> joint = link.axis * rate, parent = v;
+  v = v + joint;
+  a.ang = cross(v.ang, joint.ang, a.ang);
+  a.lin = cross(v.ang + parent.ang, joint.lin, a.lin);
+  return -inertial_force(link.inertia, v.ang, a);
 }
 
 /// A wrench at the center of mass of a body as a force at the base origin.

@@ -53,8 +53,7 @@ STICKSLIP_INLINE void start_base(Tree<S>& t, const WalkInput<S>& in) {
   if constexpr (kParts & (kVelocities | kBias)) base.velocity = {in.angular_velocity, zero3<S>()};
   if constexpr (kParts & kBias) {
     base.acceleration = {zero3<S>(), -in.gravity};
-    base.force = -inertial_force(base.inertia, in.angular_velocity, base.acceleration,
-                                 acceleration_field(in.angular_velocity, zero3<S>()));
+    base.force = -inertial_force(base.inertia, in.angular_velocity, base.acceleration);
   }
   if constexpr (kParts & kLinkForces)
     if (in.base_force) base.force = base.force + *in.base_force;
@@ -113,12 +112,10 @@ void chain_bias(Tree<S>& t, const Bundle& b, const S* rates) {
   using W = Wide<S>;
   Spatial<W> v = from_parents<S, Spatial>(t, b, t.base.velocity, &LinkState<W>::velocity);
   Spatial<W> a = from_parents<S, Spatial>(t, b, t.base.acceleration, &LinkState<W>::acceleration);
-  Mat3<W> field = acceleration_field(v.ang, a.ang);
   const int last = b.first_slot + b.length - 1;
   for (int slot = b.first_slot; slot <= last; ++slot) {
     LinkState<W>& link = t.links[slot];
-    const Slot& s = t.slots[slot];
-    store(bias_of_link(link, s.prismatic, load_lanes(rates, s.joint), v, a, field), link.force);
+    store(bias_of_link(link, load_lanes(rates, t.slots[slot].joint), v, a), link.force);
     store(v, link.velocity);
     if (slot == last && b.has_children) store(a, link.acceleration);
   }

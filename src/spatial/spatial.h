@@ -62,41 +62,13 @@ template <class S>
 STICKSLIP_INLINE RigidInertia<S> operator+(const RigidInertia<S>& a, const RigidInertia<S>& b) {
   return {a.mass + b.mass, a.h + b.h, a.rot + b.rot};
 }
-/// A with A r + a the acceleration of the point r of a body, a that of its point at the reference:
-/// [alpha]x + w w^T - |w|^2.
-template <class S>
-STICKSLIP_INLINE Mat3<S> acceleration_field(const Vec3<S>& w, const Vec3<S>& alpha) {
-  const S yy = w.y * w.y, zz = w.z * w.z;
-  return {{nmadd(w.y, w.y, -zz), madd(w.x, w.y, -alpha.z), madd(w.x, w.z, alpha.y),
-           madd(w.x, w.y, alpha.z), nmadd(w.x, w.x, -zz), madd(w.y, w.z, -alpha.x),
-           madd(w.x, w.z, -alpha.y), madd(w.y, w.z, alpha.x), nmadd(w.x, w.x, -yy)}};
-}
-/// `field` becomes the acceleration_field of another body that shares its acceleration at the point
-/// p; so `a`, at the reference, becomes that body's. Row by row: nine numbers less to hold.
-template <class S>
-STICKSLIP_INLINE void change_field(const Vec3<S>& w, const Vec3<S>& alpha, const Vec3<S>& p,
-                                   Mat3<S>& field, Vec3<S>& a) {
-  const S yy = w.y * w.y, zz = w.z * w.z;
-  const auto change_row = [&](S& x, S& y, S& z, const Vec3<S>& row,
-                              S& sum) __attribute__((always_inline)) {
-    sum = madd(z - row.z, p.z, madd(y - row.y, p.y, madd(x - row.x, p.x, sum)));
-    x = row.x, y = row.y, z = row.z;
-  };
-  S* m = field.m;
-  change_row(m[0], m[1], m[2],
-             {nmadd(w.y, w.y, -zz), madd(w.x, w.y, -alpha.z), madd(w.x, w.z, alpha.y)}, a.x);
-  change_row(m[3], m[4], m[5],
-             {madd(w.x, w.y, alpha.z), nmadd(w.x, w.x, -zz), madd(w.y, w.z, -alpha.x)}, a.y);
-  change_row(m[6], m[7], m[8],
-             {madd(w.x, w.z, -alpha.y), madd(w.y, w.z, alpha.x), nmadd(w.x, w.x, -yy)}, a.z);
-}
-/// Force that gives a body with angular velocity w the angular acceleration a.ang, its point at the
-/// reference the acceleration a.lin; `field` is the acceleration_field.
+/// Force that gives a body with angular velocity w the angular acceleration a.ang, and its point at
+/// the reference the acceleration a.lin.
 template <class S>
 STICKSLIP_INLINE Spatial<S> inertial_force(const RigidInertia<S>& i, const Vec3<S>& w,
-                                           const Spatial<S>& a, const Mat3<S>& field) {
+                                           const Spatial<S>& a) {
   return {cross(w, i.rot * w, madd(i.rot, a.ang, cross(i.h, a.lin))),
-          madd(field, i.h, a.lin * i.mass)};
+          cross(w, cross(w, i.h), cross(a.ang, i.h, a.lin * i.mass))};
 }
 /// Inertia of a body with mass m, center of mass c and inertia `about_com`, seen from the reference
 /// point.

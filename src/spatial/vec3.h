@@ -67,12 +67,6 @@ struct Mat3 {
 };
 
 template <class S>
-STICKSLIP_INLINE Mat3<S> operator-(const Mat3<S>& a, const Mat3<S>& b) {
-  const S *x = a.m, *y = b.m;
-  return {{x[0] - y[0], x[1] - y[1], x[2] - y[2], x[3] - y[3], x[4] - y[4], x[5] - y[5],
-           x[6] - y[6], x[7] - y[7], x[8] - y[8]}};
-}
-template <class S>
 STICKSLIP_INLINE Vec3<S> operator*(const Mat3<S>& a, const Vec3<S>& b) {
   const S* m = a.m;
   return {madd(m[2], b.z, madd(m[1], b.y, m[0] * b.x)),
