@@ -38,7 +38,7 @@ struct Task {
 unsigned feet(Random&) { return 0xf; }
 unsigned diagonal(Random& rng) { return rng.below(2) ? 0x9 : 0x6; }
 unsigned landing(Random& rng) {
-  // Of the torso an end, or all of it; 6.6 contacts on average.
+  // Of the torso an end, a side, all of it, or nothing.
   unsigned s = 0;
   for (int k = 0; k < 4; ++k) s |= unsigned(rng.below(4) > 0) << k;
   const int side = rng.below(4);
@@ -50,11 +50,15 @@ unsigned sparse(Random& rng) {
   for (int k = rng.integer(0, 3); k > 0; --k) s |= 1u << rng.below(8);
   return s;
 }
-constexpr Task kTasks[] = {{"STAND", kStand, 3e-4, feet},
-                           {"TROT", kTrot, 3e-3, diagonal},
-                           {"HANG", kImpact, 3e-3, feet},
-                           {"DROP", kDropTwelve, 3e-2, landing},
-                           {"RANDOM", kDropTwelve, 1e-2, sparse}};
+unsigned two_soles(Random& rng) {
+  // One sole of four points, or both.
+  const int which = rng.below(3);
+  return which == 0 ? 0xfu : which == 1 ? 0xf0u : 0xffu;
+}
+constexpr Task kTasks[] = {
+    {"STAND", kStand, 3e-4, feet},         {"TROT", kTrot, 3e-3, diagonal},
+    {"HANG", kImpact, 3e-3, feet},         {"DROP", kDropTwelve, 3e-3, landing},
+    {"RANDOM", kDropTwelve, 1e-2, sparse}, {"SOLES", kSoles, 1e-2, two_soles}};
 
 /// One robot: twelve contacts, of which some are active.
 struct Robot {
@@ -63,17 +67,17 @@ struct Robot {
 };
 Robot random_robot(const Task& t, Random& rng) {
   Robot r;
-  const QuadrupedScene all = t.scene == kDropTwelve ? kDropTwelve
-                             : t.scene == kTrot     ? kImpact
-                                                    : t.scene;
-  r.p = random_robot_problem(all, rng);
+  // Most of the time what was dropped lies on four feet and four corners.
+  const bool lies = t.slots == landing && rng.below(4);
+  r.p = random_robot_problem(lies ? kRestEight : t.scene == kTrot ? kImpact : t.scene, rng);
   r.active = t.slots(rng);
+  if (lies) r.active = (r.active & 0xff) | 1;
   return r;
 }
 
 template <class S>
 struct Block {
-  explicit Block(FactoredCapacity capacity = {kSlots, 6}) {
+  explicit Block(FactoredCapacity capacity = {kSlots, 12}) {
     const long bytes = (FactoredProblem<S>::required_bytes(capacity) + 63) / 64 * 64;
     memory.reset(static_cast<char*>(std::aligned_alloc(64, bytes)));
     std::memset(memory.get(), 0, bytes);
@@ -93,20 +97,23 @@ template <class S>
 void fill(Block<S>& b, const std::vector<Robot>& robots, const std::vector<double>& change,
           double amount) {
   using T = Value<S>;
-  b.p.clear(6);
+  // Soles share the joints of their leg, which are then the dofs 6 to 11.
+  const bool soles = robots[0].p.soles;
+  const int columns = soles ? 9 : 6;
+  b.p.clear(soles ? 12 : 6);
   unsigned all = 0;
   for (const Robot& r : robots) all |= r.active;
   for (int slot = 0; slot < kSlots; ++slot) {
     if (!(all >> slot & 1)) continue;
     const int c = b.p.add();
-    S active = constant<S>(0), rows[6][3];
+    S active = constant<S>(0), rows[9][3];
     for (int l = 0; l < int(robots.size()); ++l) {
       const RobotProblem& p = robots[l].p;
       const auto put = [l](S& to, double x) { set_lane(to, l, T(x)); };
       const int i = slot < p.n ? slot : 0;
       put(active, robots[l].active >> slot & 1);
       for (int r = 0; r < 3; ++r) {
-        for (int k = 0; k < 6; ++k) put(rows[k][r], p.y[i][r][k]);
+        for (int k = 0; k < columns; ++k) put(rows[k][r], p.y[i][r][k < 6 ? k : k + 3 * p.leg[i]]);
         double free = p.c0[i][r];
         for (int k = 0; k < 18; ++k) free += p.y[i][r][k] * amount * change[18 * l + k];
         put(b.p.offset(c)[r], free);
@@ -115,13 +122,17 @@ void fill(Block<S>& b, const std::vector<Robot>& robots, const std::vector<doubl
       for (int r = 0; r < 3; ++r)
         for (int s = r; s < 3; ++s, ++e) {
           double sum = 0;
-          for (int k = 6; k < 18; ++k) sum += p.y[i][r][k] * p.y[i][s][k];
+          for (int k = 6; k < 18 && !soles; ++k) sum += p.y[i][r][k] * p.y[i][s][k];
           put(b.p.private_block(c)[e], sum);
         }
       put(b.p.friction(c), p.mu);
     }
     b.p.active(c) = active > constant<S>(0);
-    for (int k = 0; k < 6; ++k) b.p.y(c)[k] = make_row3(rows[k][0], rows[k][1], rows[k][2]);
+    for (int k = 0; k < columns; ++k) b.p.y(c)[k] = make_row3(rows[k][0], rows[k][1], rows[k][2]);
+    if (!soles) continue;
+    const int first = slot < 4 ? 6 : 9;
+    const int index[9] = {0, 1, 2, 3, 4, 5, first, first + 1, first + 2};
+    b.p.set_index(c, index, 9);
   }
 }
 
@@ -167,7 +178,7 @@ void time_task(const Task& task, const char* name) {
       for (auto& b : blocks)
         for (int c = 0; c < b->p.size(); ++c) {
           for (int r = 0; r < 3; ++r) b->p.impulse(c)[r] = b->start[c][r];
-          prepare_contact<6>(b->p.contact(c));
+          b->p.six() ? prepare_contact<6>(b->p.contact(c)) : prepare_contact<0>(b->p.contact(c));
         }
     prepare_times.push_back((thread_seconds() - then) / (kPasses * kEach * kLanes) * 1e9);
   }

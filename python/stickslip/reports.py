@@ -19,8 +19,8 @@ class StepStatus(enum.IntFlag):
     """Cause: a contact solve stayed above its tolerance. Consequence: the best impulse found was used, see the residual in
     `solve_info`. Remedy: a smaller step."""
     NON_FINITE = 2
-    """Cause: an input was not finite, or forces or velocities overflowed. Consequence: the robot was left in its last finite state; a World
-    raises StepError, a Batch flags the environment. Remedy: a smaller step, smaller forces or gains."""
+    """Cause: an input was not finite, or forces or velocities overflowed. Consequence: the robot was left in its last
+    finite state; a World raises StepError, a Batch flags the environment. Remedy: a smaller step, smaller forces or gains."""
 
 
 @dataclass(frozen=True)

@@ -35,9 +35,9 @@ FactoredOptions default_options() {
     o.tolerance_absolute = 1e-6;
     o.tolerance_relative = 1e-5;
     o.residual_tolerance = 1e-5;
-    // With less weight, Newton steps chase the rounding of redundant contacts; with more, they creep
-    // where robots hang and slide. What is not solved after twelve sweeps seldom is (measured on the
-    // tasks of benchmarks/compare and benchmarks/micro/lane_kernels.cc).
+    // With less weight, Newton steps chase the rounding of redundant contacts; with more, they
+    // creep where robots hang and slide. What is not solved after twelve sweeps seldom is (measured
+    // on the tasks of benchmarks/compare and benchmarks/micro/lane_kernels.cc).
     o.alpha = 5e-5;
     o.alpha_late = 5e-3;
     o.late = 5;
@@ -142,32 +142,41 @@ STICKSLIP_INLINE Mask<S> iterate(FactoredProblem<S>& p, Mask<S> live, S toleranc
   }
 }
 
+template <int M>
+void prepare_contacts(FactoredProblem<double>& p) {
+  for (int i = 0; i < p.size(); ++i) {
+    p.complete(i);
+    prepare_contact<M>(p.contact(i));
+  }
+}
+
 /// Calls f(problem, lane) with each of the lanes as a prepared problem in double, and takes the
 /// impulses and w that it leaves (`lambda` and w are those of p).
 template <int M, class S, class F>
 void improve_lanes(FactoredProblem<S>& p, Mask<S> lanes, F&& f) {
   for (int i = 0; i < p.size(); ++i) store(p.contact(i).lambda, p.contact(i).impulse);
   solve_lanes(p, lanes, [&](FactoredProblem<double>& q, int lane) {
-    // Prepared afresh also where it is p itself: the same bits either way.
-    for (int i = 0; i < q.size(); ++i) {
-      q.complete(i);
-      prepare_contact<M>(q.contact(i));
-    }
+    prepare_contacts<M>(q);  // also where it is p itself: the same bits either way
     f(q, lane);
     for (int i = 0; i < q.size(); ++i) store(q.contact(i).lambda, q.contact(i).impulse);
   });
   for (int i = 0; i < p.size(); ++i) set_impulse(p.contact(i), p.contact(i).impulse);
 }
 
-/// The residuals of these lanes' impulses, evaluated in double. In float the evaluation itself errs
-/// by more than the tolerance where points are fast.
+/// The residuals of these lanes' impulses, evaluated in double; nothing of p changes. In float the
+/// evaluation itself errs by more than the tolerance where points are fast.
 template <int M, class S>
 __attribute__((noinline)) S certify_in_double(FactoredProblem<S>& p, Mask<S> lanes) {
   S worst = constant<S>(0);
-  improve_lanes<M>(p, lanes, [&](FactoredProblem<double>& q, int lane) {
+  for (int i = 0; i < p.size(); ++i) store(p.contact(i).lambda, p.contact(i).impulse);
+  for (int lane = 0; lane < ScalarTraits<S>::kWidth; ++lane) {
+    if (!get_lane(lanes, lane)) continue;
+    FactoredProblem<double>& q = *p.lane;
+    extract_lane(p, lane, q);
+    prepare_contacts<M>(q);
     accumulate<M>(q);
     set_lane(worst, lane, Value<S>(certify<M, false>(q)));
-  });
+  }
   return worst;
 }
 
@@ -237,7 +246,8 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
     }
     if (any(bad)) {
       release_jams<M, kMaxDissipation>(p, bad, sqrt(fastest), allowed);
-      worst = certify<M, kMaxDissipation>(p);
+      // Not of lanes that float would call unsolved again.
+      worst = select(bad, certify<M, kMaxDissipation>(p), worst);
     }
   }
   (void)open;

@@ -107,7 +107,7 @@ struct FactoredContact {
   // Transposed rows of a plain scalar.
   int chunks;
   int* chunk_start;  // dof of a chunk's first lane
-  Chunk<S>* yt;      // (3, chunks), zero where a chunk reaches past the touched dofs
+  Chunk<S>* yt;      // (chunks, 3), zero where a chunk reaches past the touched dofs
   // Newton step.
   bool moves;            // it takes part
   Row3<S> n_columns[3];  // N, eliminated response of the contact
@@ -135,7 +135,7 @@ STICKSLIP_INLINE int first_dof(const FactoredContact<S>& c, int chunk) {
 template <int M, class S>
 STICKSLIP_INLINE const Chunk<S>& row_chunk(const FactoredContact<S>& c, int r, int chunk) {
   if constexpr (ScalarTraits<S>::kWidth == 1)
-    return c.yt[r * chunk_count<M>(c) + chunk];
+    return c.yt[3 * chunk + r];
   else
     return r == 0 ? c.y[chunk].x : r == 1 ? c.y[chunk].y : c.y[chunk].z;
 }

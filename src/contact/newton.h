@@ -129,6 +129,8 @@ STICKSLIP_STAGE void eliminate_contacts(FactoredProblem<S>& p, Mask<S> live, S a
     for (int l = 0; l < kLanes; ++l) {
       const int i = first + l < n ? first + l : first;  // the last pack is filled with copies
       FactoredContact<S>& c = p.contact(i);
+      c.moves = kPlain || any(live & c.active);
+      if (!c.moves) continue;
       S v[3], lambda[3];
       contact_velocity<M>(c, p.w, v);
       store(c.lambda, lambda);
@@ -243,6 +245,24 @@ STICKSLIP_STAGE S* solve_fixed(FactoredProblem<S>& p) {
   return x;
 }
 
+/// Adds Y^T N Y of one contact of a pack to the rows of N dofs of the matrix, from the k-th that it
+/// touches.
+template <int N, class S>
+STICKSLIP_INLINE void add_response(const FactoredContact<S>& c, int k, S* matrix, int stride) {
+  S t[N][3], *row[N];
+  for (int i = 0; i < N; ++i) {
+    row[i] = matrix + c.index[k + i] * stride;
+    for (int r = 0; r < 3; ++r) t[i][r] = c.yn[r * c.count + k + i];
+  }
+  for (int q = 0; q < c.count; ++q) {
+    const int at = c.index[q];
+    const Row3<S>& y = c.y[q];
+#pragma GCC unroll 3
+    for (int i = 0; i < N; ++i)
+      row[i][at] = madd(y.z, t[i][2], madd(y.y, t[i][1], madd(y.x, t[i][0], row[i][at])));
+  }
+}
+
 /// The same for any number of shared dofs, in p.matrix.
 template <class S>
 STICKSLIP_STAGE S* solve_any(FactoredProblem<S>& p) {
@@ -255,6 +275,12 @@ STICKSLIP_STAGE S* solve_any(FactoredProblem<S>& p) {
   for (int i = 0; i < p.size(); ++i) {
     const FactoredContact<S>& c = p.contact(i);
     if (!c.moves) continue;
+    if constexpr (K == 1) {  // a pack
+      int k = 0;
+      for (; k + 2 < c.count; k += 3) add_response<3>(c, k, h, stride);
+      for (; k < c.count; ++k) add_response<1>(c, k, h, stride);
+      continue;
+    }
     const int chunks = chunk_count<0>(c);
     for (int j = 0, k = 0; j < chunks; ++j)
       for (; k < c.count && c.index[k] < first_dof<0>(c, j) + K; ++k) {

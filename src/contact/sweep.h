@@ -13,42 +13,42 @@
 
 namespace stickslip::contact::inline STICKSLIP_KERNELS {
 
+/// Rows of three to three rows: out[r] holds entry r of the four columns.
+template <class V>
+STICKSLIP_INLINE void transpose_columns(V a, V b, V c, V d, V out[3]) {
+  const V ab = __builtin_shufflevector(a, b, 0, 4, 2, 6),
+          cd = __builtin_shufflevector(c, d, 0, 4, 2, 6);
+  out[0] = __builtin_shufflevector(ab, cd, 0, 1, 4, 5);
+  out[1] = __builtin_shufflevector(__builtin_shufflevector(a, b, 1, 5, 3, 7),
+                                   __builtin_shufflevector(c, d, 1, 5, 3, 7), 0, 1, 4, 5);
+  out[2] = __builtin_shufflevector(ab, cd, 2, 3, 6, 7);
+}
+
 /// Transposed rows in chunks, from the rows; a pack needs none.
 template <int M, class S>
 STICKSLIP_INLINE void transpose_rows(FactoredContact<S>& c) {
-  if constexpr (ScalarTraits<S>::kWidth > 1) {
-    return;
-  } else if constexpr (M == 6) {
+  if constexpr (ScalarTraits<S>::kWidth == 1) {
     using V = typename Chunk<S>::Vector;
-    c.chunks = 2;
-    const V a = c.y[0].v.v, b = c.y[1].v.v, d = c.y[2].v.v, e = c.y[3].v.v, f = c.y[4].v.v,
-            g = c.y[5].v.v;
-    const V ab = __builtin_shufflevector(a, b, 0, 4, 2, 6),
-            abh = __builtin_shufflevector(a, b, 1, 5, 3, 7);
-    const V de = __builtin_shufflevector(d, e, 0, 4, 2, 6),
-            deh = __builtin_shufflevector(d, e, 1, 5, 3, 7);
-    const V zero = {}, fg = __builtin_shufflevector(f, g, 0, 4, 2, 6),
-            fgh = __builtin_shufflevector(f, g, 1, 5, 3, 7);
-    c.yt[0] = __builtin_shufflevector(ab, de, 0, 1, 4, 5);
-    c.yt[1] = __builtin_shufflevector(fg, zero, 0, 1, 4, 5);
-    c.yt[2] = __builtin_shufflevector(abh, deh, 0, 1, 4, 5);
-    c.yt[3] = __builtin_shufflevector(fgh, zero, 0, 1, 4, 5);
-    c.yt[4] = __builtin_shufflevector(ab, de, 2, 3, 6, 7);
-    c.yt[5] = __builtin_shufflevector(fg, zero, 2, 3, 6, 7);
-  } else {
+    const V none = {};
+    const int n = M == 6 ? 6 : c.count;
     int chunks = 0;
-    for (int k = 0; k < c.count; ++chunks) {
-      c.chunk_start[chunks] = c.index[k];
-      while (k < c.count && c.index[k] < c.chunk_start[chunks] + 4) ++k;
+    for (int k = 0; k < n; ++chunks) {
+      const int first = M == 6 ? 4 * chunks : c.index[k];
+      const V* column[4];
+      // By choice of an address, not by a branch: where a leg's dofs lie in the chunks of a contact
+      // is hard to predict.
+#pragma GCC unroll 4
+      for (int i = 0; i < 4; ++i) {
+        const bool has = k < n && (M == 6 || c.index[k] == first + i);
+        column[i] = has ? &c.y[k].v.v : &none;
+        k += has;
+      }
+      if (M == 0) c.chunk_start[chunks] = first;
+      V row[3];
+      transpose_columns(*column[0], *column[1], *column[2], *column[3], row);
+      for (int r = 0; r < 3; ++r) c.yt[3 * chunks + r] = row[r];
     }
     c.chunks = chunks;
-    for (int r = 0; r < 3; ++r)
-      for (int j = 0, k = 0; j < chunks; ++j) {
-        S lanes[4] = {};
-        for (; k < c.count && c.index[k] < c.chunk_start[j] + 4; ++k)
-          lanes[c.index[k] - c.chunk_start[j]] = c.y[k].v.v[r];
-        c.yt[r * chunks + j] = load_chunk(lanes);
-      }
   }
 }
 

@@ -36,13 +36,15 @@ class MlpPolicy:
         return len(self.biases[-1])
 
     def __call__(self, observations: ArrayLike) -> Array:
-        """(k, action size) of (k, observation size); or one row of one row."""
-        x = (np.asarray(observations, np.float32) - self.mean) / self.std
+        """(k, action size) of (k, observation size), each row by itself, to the bit; or one row of one row."""
+        rows = np.asarray(observations, np.float32)
+        x = (np.atleast_2d(rows) - self.mean) / self.std
         for k, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             if k:
                 x = np.where(x > 0, x, np.expm1(np.minimum(x, 0)))
-            x = x @ weight.T + bias
-        return x
+            # Not `@`: BLAS would start threads, which get into the way of a batch's own, and its bits vary with k.
+            x = np.einsum("ki,oi->ko", x, weight) + bias
+        return x.reshape(*rows.shape[:-1], self.action_size)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes a .npz file."""

@@ -8,7 +8,7 @@
 #include <algorithm>
 
 #include "check.h"
-#include "step/bodies.h"
+#include "step/twin_world.h"
 
 using namespace bodies;
 
@@ -24,7 +24,7 @@ double late(Integrator integrator) { return integrator == Integrator::kEnergySaf
 double touch(Integrator integrator) { return integrator == Integrator::kEnergySafe ? 0 : -1e-12; }
 
 struct Scene {
-  World world;
+  TwinWorld world;
   Robot& robot;
   Scene(const ModelPtr& model, const WorldOptions& o, double friction, double restitution = 0,
         double ground = 0)
@@ -501,3 +501,5 @@ TEST(EverySolverMethodSlidesABlockAlike) {
       CHECK_NEAR(s.robot.u()[1], v * std::sin(0.8), 1e-5);
     }
 }
+
+TEST(AllOfThisHeldForBatchesToo) { CHECK(TwinWorld::compared() > 1000); }

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "check.h"
-#include "step/bodies.h"
+#include "step/twin_world.h"
 
 using namespace bodies;
 
@@ -18,7 +18,8 @@ struct Throw {
 };
 
 Throw throw_tree(const ModelPtr& model, unsigned seed, double rate, double dt, double duration) {
-  World world(options(dt));
+  TwinWorld world(options(dt));
+  if (seed % 5 != 0) world.go_alone();  // a pack of these takes long
   world.add_ground();
   Robot& robot = world.add_robot(model);
   const State s = random_state(*model, seed, rate, 1.0);
@@ -103,7 +104,7 @@ TEST(ContactTakesEnergyAtEveryLanding) {
 TEST(ABouncingBallNeverRisesAboveItsStart) {
   for (const double e : {0.5, 1.0})
     for (const double dt : {1e-3, 20e-3}) {
-      World world(options(dt));
+      TwinWorld world(options(dt));
       world.add_ground();
       world.set_material_pair("default", "default", {0.5, e, 0});
       Robot& robot = world.add_robot(sphere(0.1, 1));
@@ -123,7 +124,7 @@ TEST(ABouncingBallNeverRisesAboveItsStart) {
 TEST(AnOverlappingBallIsLiftedInOneStepAndGetsNoSpeedWorthTheName) {
   // At most what closes 0.1 um in a step (docs/design/007-contact-points-on-the-plane.md).
   for (const double depth : {1e-6, 1e-3, 3e-2}) {
-    World world(options(1e-3));
+    TwinWorld world(options(1e-3));
     world.add_ground();
     Robot& robot = world.add_robot(sphere(0.1, 2));
     robot.set_state(base_at(robot.model(), {0, 0, 0.1 - depth}), std::vector<double>(6, 0.0));
@@ -139,7 +140,7 @@ TEST(OverlapOfAJointedRobotGoesBelowATenthOfAMicrometer) {
   // Placed 2 cm deep; links share the lift. One pass per step is linear, so a few steps are needed.
   for (unsigned seed = 0; seed < 20; ++seed) {
     const ModelPtr m = thrown_tree(seed);
-    World world(options(1e-3));
+    TwinWorld world(options(1e-3));
     world.add_ground();
     Robot& robot = world.add_robot(m);
     State s = random_state(*m, seed, 0, 2.0);
@@ -166,7 +167,7 @@ TEST(LiftingAFallingRobotOutOfTheGroundCostsItsOwnMotion) {
   // Deep in the ground and with joints turning: energy may not grow by more than the motion pays.
   for (unsigned seed = 0; seed < 20; ++seed) {
     const ModelPtr m = thrown_tree(seed);
-    World world(options(1e-3));
+    TwinWorld world(options(1e-3));
     world.add_ground();
     Robot& robot = world.add_robot(m);
     const State s = random_state(*m, seed, 5, 0.0);
@@ -188,7 +189,7 @@ TEST(AStepIsCutOnlyWhereLinksTurnFar) {
   const auto substeps = [](const ModelPtr& m, int row, double rate, int most) {
     WorldOptions o = options(5e-3, Integrator::kEnergySafe, {0, 0, 0});
     o.max_substeps = most;
-    World world(o);
+    TwinWorld world(o);
     Robot& robot = world.add_robot(m);
     State s = random_state(*m, 1, 0);
     s.u[row] = rate;
@@ -215,7 +216,7 @@ TEST(AStepIsCutOnlyWhereLinksTurnFar) {
 
 TEST(SubstepsDoNotChangeAMotionThatNeedsNone) {
   // A ball that spins about its own axis: substeps cut the step, the parabola stays.
-  World world(options(10e-3));
+  TwinWorld world(options(10e-3));
   Robot& robot = world.add_robot(sphere(0.1, 1));
   robot.set_state(base_at(robot.model(), {0, 0, 0}), std::vector<double>{1, 0, 5, 0, 0, 90});
   for (int k = 1; k <= 50; ++k) {
@@ -240,7 +241,7 @@ TEST(GeneralizedForcesActAsInverseMassTimesForceOverTheStep) {
   for (const Integrator integrator : kBoth)
     for (const BaseType base : {BaseType::kFloating, BaseType::kFixed}) {
       const ModelPtr m = tree(21, {.joints = 7, .base = base});
-      World world(options(dt, integrator, {0, 0, 0}));
+      TwinWorld world(options(dt, integrator, {0, 0, 0}));
       Robot& robot = world.add_robot(m);
       State s = random_state(*m, 2, 0);
       robot.set_state(s.q, s.u);
@@ -265,7 +266,7 @@ TEST(GeneralizedForcesActAsInverseMassTimesForceOverTheStep) {
 TEST(BaseForcesGiveExactlyTheirMomentumAndJointForcesNone) {
   const double dt = 5e-3;
   const ModelPtr m = tree(22, {.joints = 7});
-  World world(options(dt, Integrator::kEnergySafe, {0, 0, 0}));
+  TwinWorld world(options(dt, Integrator::kEnergySafe, {0, 0, 0}));
   Robot& robot = world.add_robot(m);
   const State s = random_state(*m, 4, 2);
   robot.set_state(s.q, s.u);
@@ -292,7 +293,7 @@ TEST(BaseForcesGiveExactlyTheirMomentumAndJointForcesNone) {
 TEST(AHoveringBodyStaysWhereItIsAndThenFallsFreely) {
   for (const Integrator integrator : kBoth)
     for (const double h : {1e-3, 20e-3}) {
-      World world(options(h, integrator));
+      TwinWorld world(options(h, integrator));
       Robot& robot = world.add_robot(sphere(0.1, 2));
       std::vector<double> tau(6, 0.0);
       tau[2] = 2 * kGravity;
@@ -309,7 +310,7 @@ TEST(AHoveringBodyStaysWhereItIsAndThenFallsFreely) {
 
 TEST(AnArmHeldByPdControlRestsWithoutSpeed) {
   for (const Integrator integrator : kBoth) {
-    World world(options(5e-3, integrator));
+    TwinWorld world(options(5e-3, integrator));
     Robot& robot = world.add_robot(one_joint(LinkJointType::kRevolute, 1, 0.3, 0.01));
     robot.set_pd_gains(std::vector<double>{100}, std::vector<double>{5});
     robot.set_pd_target(std::vector<double>{1.5});
@@ -322,7 +323,7 @@ TEST(AnArmHeldByPdControlRestsWithoutSpeed) {
 
 TEST(AForceThatHoldsTheWeightHoldsTheRobot) {
   for (const Integrator integrator : kBoth) {
-    World world(options(1e-3, integrator));
+    TwinWorld world(options(1e-3, integrator));
     const ModelPtr m = tree(23, {.joints = 5, .base = BaseType::kFixed});
     Robot& robot = world.add_robot(m);
     const State s = random_state(*m, 6, 0);
@@ -340,7 +341,7 @@ TEST(JointDampingOfTheModelDecaysAsTheImplicitScheme) {
   const double inertia = 0.3, damping = 0.7, h = 10e-3;
   for (const Integrator integrator : kBoth)
     for (const LinkJointType type : {LinkJointType::kRevolute, LinkJointType::kPrismatic}) {
-      World world(options(h, integrator, {0, 0, 0}));
+      TwinWorld world(options(h, integrator, {0, 0, 0}));
       Robot& robot = world.add_robot(one_joint(type, inertia, 0, inertia, damping));
       robot.set_state(std::vector<double>{0}, std::vector<double>{2});
       double u = 2, q = 0;
@@ -358,7 +359,7 @@ TEST(PdControlFollowsItsImplicitRecurrence) {
   const double gains[][2] = {{40, 1}, {200, 5}, {1e5, 10}, {1e9, 0}, {0, 1e9}};
   for (const Integrator integrator : kBoth)
     for (const auto& [kp, kd] : gains) {
-      World world(options(h, integrator, {0, 0, 0}));
+      TwinWorld world(options(h, integrator, {0, 0, 0}));
       Robot& robot = world.add_robot(one_joint(LinkJointType::kPrismatic, inertia, 0, 0.1));
       robot.set_pd_gains(std::vector<double>{kp}, std::vector<double>{kd});
       robot.set_pd_target(std::vector<double>{target});
@@ -378,7 +379,7 @@ TEST(VeryStiffGainsHoldARobotOnTheGroundAt20Milliseconds) {
   for (const Integrator integrator : kBoth)
     for (const double kp : {1e3, 1e6, 1e9}) {
       const ModelPtr m = tree(24, {.joints = 8, .prismatic = false, .shapes = true});
-      World world(options(20e-3, integrator));
+      TwinWorld world(options(20e-3, integrator));
       world.add_ground();
       Robot& robot = world.add_robot(m);
       const State s = random_state(*m, 7, 0, 0.8);
@@ -403,7 +404,7 @@ TEST(QuestionsBetweenStepsDoNotChangeTheMotion) {
   for (const Integrator integrator : kBoth) {
     std::vector<double> q[2];
     for (int asks = 0; asks < 2; ++asks) {
-      World world(options(5e-3, integrator));
+      TwinWorld world(options(5e-3, integrator));
       world.add_ground();
       Robot& robot = world.add_robot(m);
       const State s = random_state(*m, 8, 2, 0.5);
@@ -426,3 +427,5 @@ TEST(QuestionsBetweenStepsDoNotChangeTheMotion) {
     CHECK(same_bits(q[0], q[1]));
   }
 }
+
+TEST(AllOfThisHeldForBatchesToo) { CHECK(TwinWorld::compared() > 1000); }

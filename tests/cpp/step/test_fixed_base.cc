@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "check.h"
+#include "step/twin_world.h"
 
 using namespace stickslip;
 
@@ -50,7 +50,7 @@ struct Run {
 };
 
 Run run(Kind kind, const WorldOptions& options, const MaterialPair& law, double seconds) {
-  World world(options);
+  bodies::TwinWorld world(options);
   world.add_ground();
   world.set_material_pair("default", "default", law);
   RobotOptions where;
@@ -161,7 +161,7 @@ TEST(AStepDoesNotHideAContactThatCannotPush) {
   Shape ball;
   ball.size = {0.05, 0, 0};
   builder.add_shape("cart", ball);
-  World world(options(Integrator::kEnergySafe, 1e-3));
+  bodies::TwinWorld world(options(Integrator::kEnergySafe, 1e-3));
   world.add_ground();
   RobotOptions where;
   where.position = {0, 0, 0.04};
@@ -169,3 +169,5 @@ TEST(AStepDoesNotHideAContactThatCannotPush) {
   CHECK(world.step() == StepStatus::kNotConverged);
   CHECK(robot.info().contacts == 1 && robot.info().residual > 1e-5);
 }
+
+TEST(AllOfThisHeldForBatchesToo) { CHECK(bodies::TwinWorld::compared() > 1000); }

@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "check.h"
-#include "step/bodies.h"
+#include "step/twin_world.h"
 
 using namespace bodies;
 
@@ -25,7 +25,7 @@ std::vector<ModelPtr> movers(BaseType base = BaseType::kFloating) {
 }
 
 State run(const ModelPtr& model, const State& start, const WorldOptions& o, double duration) {
-  World world(o);
+  TwinWorld world(o);
   Robot& robot = world.add_robot(model);
   robot.set_state(start.q, start.u);
   world.step(static_cast<int>(std::lround(duration / o.time_step)));
@@ -130,7 +130,7 @@ TEST(MomentumAndEnergyAreKeptToRoundingWithInternalMotion) {
   for (const double dt : {1e-3, 5e-3, 20e-3})
     for (const ModelPtr& m : movers())
       for (int seed = 0; seed < 3; ++seed) {
-        World world(options(dt, Integrator::kEnergySafe, kNone));
+        TwinWorld world(options(dt, Integrator::kEnergySafe, kNone));
         Robot& robot = world.add_robot(m);
         const State start = random_state(*m, 40 + seed, 3);
         robot.set_state(start.q, start.u);
@@ -152,7 +152,7 @@ TEST(MomentumAndEnergyAreKeptToRoundingWithInternalMotion) {
 TEST(FallingAddsExactlyTheImpulseOfGravity) {
   for (const double dt : {1e-3, 20e-3})
     for (const ModelPtr& m : movers()) {
-      World world(options(dt, Integrator::kEnergySafe, {1.5, -2.5, -kGravity}));
+      TwinWorld world(options(dt, Integrator::kEnergySafe, {1.5, -2.5, -kGravity}));
       Robot& robot = world.add_robot(m);
       const State start = random_state(*m, 60, 3);
       robot.set_state(start.q, start.u);
@@ -179,7 +179,7 @@ TEST(FallingAddsExactlyTheImpulseOfGravity) {
 }
 
 TEST(ABallFollowsTheParabolaExactly) {
-  World world(options(10e-3));
+  TwinWorld world(options(10e-3));
   Robot& robot = world.add_robot(sphere(0.1, 2));
   const std::vector<double> u{1, -2, 3, 0.3, -0.2, 0.1};
   robot.set_state(base_at(robot.model(), {0, 0, 1}), u);
@@ -195,7 +195,7 @@ TEST(ABallFollowsTheParabolaExactly) {
 }
 
 TEST(ThePaperStepFallsAsSemiImplicitEulerDoes) {
-  World world(options(10e-3, Integrator::kSemiImplicit));
+  TwinWorld world(options(10e-3, Integrator::kSemiImplicit));
   Robot& robot = world.add_robot(sphere(0.1, 2));
   for (int k = 1; k <= 100; ++k) {
     world.step();
@@ -211,7 +211,7 @@ TEST(ATumblingBodyKeepsItsAngularMomentumAndNearlyItsEnergy) {
   double worst[2];
   for (int k = 0; k < 2; ++k) {
     const double dt = 10e-3 / (1 << k);
-    World world(options(dt, Integrator::kEnergySafe, kNone));
+    TwinWorld world(options(dt, Integrator::kEnergySafe, kNone));
     Robot& robot = world.add_robot(plate);
     robot.set_state(base_at(*plate, {0, 0, 0}), std::vector<double>{0, 0, 0, 0.1, 8, 0.1});
     const Vector3 l = robot.angular_momentum();
@@ -236,7 +236,7 @@ TEST(APendulumMovesAsVerletOrSymplecticEuler) {
   const double stiffness = mass * kGravity * reach / whole;
   for (const Integrator integrator : kBoth) {
     const double h = 5e-3;
-    World world(options(h, integrator));
+    TwinWorld world(options(h, integrator));
     Robot& robot = world.add_robot(one_joint(LinkJointType::kRevolute, mass, reach, inertia));
     double q = 1.2, u = -0.7;
     robot.set_state(std::vector<double>{q}, std::vector<double>{u});
@@ -265,7 +265,7 @@ TEST(PeriodOfAPendulumConvergesToTheEllipticIntegral) {
   double error[3];
   for (int k = 0; k < 3; ++k) {
     const double h = 20e-3 / (1 << k);
-    World world(options(h));
+    TwinWorld world(options(h));
     Robot& robot = world.add_robot(one_joint(LinkJointType::kRevolute, mass, reach, inertia));
     robot.set_state(std::vector<double>{amplitude}, std::vector<double>{0});
     // Ten periods, from the downward crossings of q = 0 by interpolation with u.
@@ -294,7 +294,7 @@ TEST(EnergyOfASwingingArmStaysBounded) {
         tree(12, {.joints = 6, .base = BaseType::kFixed, .prismatic = false})}) {
     double worst[2];
     for (int k = 0; k < 2; ++k) {
-      World world(options(5e-3 / (1 << k)));
+      TwinWorld world(options(5e-3 / (1 << k)));
       Robot& robot = world.add_robot(m);
       const State start = random_state(*m, 8, 1);
       robot.set_state(start.q, start.u);
@@ -313,7 +313,7 @@ TEST(EnergyOfASwingingArmStaysBounded) {
 
 TEST(ASliderFallsOnTheParabola) {
   for (const Integrator integrator : kBoth) {
-    World world(options(2e-3, integrator));
+    TwinWorld world(options(2e-3, integrator));
     // The axis is tilted: 0.6 across, 0.8 up.
     Robot& robot =
         world.add_robot(one_joint(LinkJointType::kPrismatic, 3, 0.2, 0.01, 0, {0.6, 0, 0.8}));
@@ -341,7 +341,7 @@ TEST(ABarePrismaticPairOscillatesAboutItsCenterOfMass) {
   const ModelPtr pair = builder.build(BaseType::kFloating);
   const double h = 4e-3, kp = 50, reduced = 2.0 * 3 / 5;
   for (const Integrator integrator : kBoth) {
-    World world(options(h, integrator, kNone));
+    TwinWorld world(options(h, integrator, kNone));
     Robot& robot = world.add_robot(pair);
     robot.set_pd_gains(std::vector<double>{kp}, std::vector<double>{0});
     std::vector<double> q = base_at(*pair, {0, 0, 0});
@@ -359,3 +359,5 @@ TEST(ABarePrismaticPairOscillatesAboutItsCenterOfMass) {
     }
   }
 }
+
+TEST(AllOfThisHeldForBatchesToo) { CHECK(TwinWorld::compared() > 1000); }
