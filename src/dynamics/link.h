@@ -32,7 +32,7 @@ template <class W, class K>
 STICKSLIP_INLINE void place_inertia(const LinkInertia<K>& c, LinkState<W>& link) {
   const Mat3<W>& r = link.rotation;
   store(inertia_at_reference(W(c.mass), madd(r, wide3<W>(c.com), link.position),
-                             rotate(r, wide_sym3<W>(c.inertia))),
+                             rotate(r, sym3(c.inertia))),
         link.inertia);
 }
 

@@ -15,7 +15,7 @@ template <class S>
 void solve_lower_transposed(Tree<S>& t, const S* tau, LinkForces forces) {
   WalkInput<S> in;
   in.tau = tau;
-  in.base_force = forces == LinkForces::kBaseOnly ? &t.base.force : nullptr;
+  if (forces == LinkForces::kBaseOnly) in.base_force = &t.base.force;
   if (forces == LinkForces::kAll)
     walk<kSolveTransposed | kLinkForces>(t, in);
   else

@@ -177,9 +177,9 @@ template <class W, class K>
 STICKSLIP_INLINE Vec3<W> wide3(const K v[3]) {
   return {W(v[0]), W(v[1]), W(v[2])};
 }
-template <class W, class K>
-STICKSLIP_INLINE Sym3<W> wide_sym3(const K v[6]) {
-  return {W(v[0]), W(v[1]), W(v[2]), W(v[3]), W(v[4]), W(v[5])};
+template <class K>
+STICKSLIP_INLINE Sym3<K> sym3(const K v[6]) {
+  return {v[0], v[1], v[2], v[3], v[4], v[5]};
 }
 template <class W, class K>
 STICKSLIP_INLINE Mat3<W> wide_mat3(const K v[9]) {

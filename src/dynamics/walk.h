@@ -26,18 +26,18 @@ enum Part : unsigned {
 /// What a walk reads besides the tree; what none of its parts needs may stay unset.
 template <class S>
 struct WalkInput {
-  const S* quaternion;           // w x y z
-  const S* joints;               // (num_joints)
-  Vec3<S> angular_velocity;      // of the base
-  Vec3<S> linear_velocity;       // of the base; only x = L u depends on it
-  const S* rates;                // (num_joints)
-  Vec3<S> gravity;               // [m/s^2]
-  const S* diagonal;             // (num_joints) or null
-  const S* tau;                  // (num_joints) or null
-  const Spatial<S>* base_force;  // on body 0, besides its bias force; or null
+  const S* quaternion;                     // w x y z
+  const S* joints;                         // (num_joints)
+  Vec3<S> angular_velocity;                // of the base
+  Vec3<S> linear_velocity;                 // of the base; only x = L u depends on it
+  const S* rates;                          // (num_joints)
+  Vec3<S> gravity;                         // [m/s^2]
+  const S* diagonal = nullptr;             // (num_joints); null: zero
+  const S* tau = nullptr;                  // (num_joints); null: zero
+  const Spatial<S>* base_force = nullptr;  // on body 0, besides its bias force
   // At the centers of mass, world axes: of body 0 and per slot; both or none.
-  const Spatial<S>* base_wrench;
-  const Spatial<Wide<S>>* wrenches;
+  const Spatial<S>* base_wrench = nullptr;
+  const Spatial<Wide<S>>* wrenches = nullptr;
 };
 
 template <unsigned kParts, class S>
@@ -47,7 +47,7 @@ STICKSLIP_INLINE void start_base(Tree<S>& t, const WalkInput<S>& in) {
   if constexpr (kParts & kInertias) {
     base.inertia = inertia_at_reference(
         t.base_mass, base.rotation * Vec3<S>{t.base_com[0], t.base_com[1], t.base_com[2]},
-        rotate(base.rotation, wide_sym3<S>(t.base_inertia)));
+        rotate(base.rotation, sym3(t.base_inertia)));
     if constexpr (kParts & kComposite) base.composite = base.inertia;
   }
   if constexpr (kParts & (kVelocities | kBias)) base.velocity = {in.angular_velocity, zero3<S>()};
