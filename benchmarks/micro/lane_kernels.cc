@@ -198,9 +198,14 @@ void time_task(const Task& task, const char* name) {
 
 int main(int argc, char** argv) {
 #ifdef __AVX512F__
+  if (!__builtin_cpu_supports("avx512vl")) return std::puts("no AVX-512 here"), 0;
   using Doubles = Pack<double, 8>;
   using Floats = Pack<float, 16>;
   const char *doubles = "double x8", *floats = "float x16";
+#elif defined(__ARM_NEON)
+  using Doubles = Pack<double, 2>;
+  using Floats = Pack<float, 4>;
+  const char *doubles = "double x2", *floats = "float x4";
 #else
   using Doubles = Pack<double, 4>;
   using Floats = Pack<float, 8>;

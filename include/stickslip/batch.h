@@ -74,9 +74,9 @@ struct ContactPoint {
 /// `step`.
 class Batch {
  public:
-  /// Takes robot, gravity, ground, materials, options, gains, forces and the present state of
-  /// `world`, which must hold exactly one robot and be solved by kAuto. Throws ModelError that says
-  /// what a batch cannot hold and what to do.
+  /// Takes robot, gravity, ground, materials, options, gains, forces, q and u of `world`; not its
+  /// warm start: environments begin as after `reset`. The world must hold exactly one robot and be
+  /// solved by kAuto. Throws ModelError that says what a batch cannot hold and what to do.
   Batch(const World& world, const BatchOptions& options);
   ~Batch();
   Batch(Batch&&) noexcept;
@@ -99,8 +99,10 @@ class Batch {
 
   /// Advances every environment by `steps` time steps; returns the status bits of all, or-ed. An
   /// environment whose inputs or result are not finite is flagged (kNonFinite) and keeps its last
-  /// finite state. Throws ModelError for a negative number.
-  StepStatus step(int steps = 1);
+  /// finite state. `go_on`, if given, is asked between parts of a long run whether to go on; where
+  /// it says no, the run ends there. Throws ModelError for a negative number, and where another
+  /// thread is at work on this batch.
+  StepStatus step(int steps = 1, bool (*go_on)() = nullptr);
 
   /// Puts environments `envs` into states q (envs, nq), u (envs, nu), row-major; empty: the state
   /// that the world had. Forgets warm starts; clears status, residual, impulses and time. Throws

@@ -64,63 +64,19 @@ ViewOut array(nb::handle_t<Batch> self, const std::string& field) {
   return ViewOut(a.data, shape.size(), shape.data(), self, nullptr, dtype_of(a.type));
 }
 
-/// Status and residual of a call that steps in parts: those of the parts, or-ed, and the largest.
-template <class T>
-class Report {
- public:
-  explicit Report(Batch& batch)
-      : now_status_(static_cast<std::uint32_t*>(batch.array(BatchField::kStatus).data)),
-        now_residual_(static_cast<T*>(batch.array(BatchField::kResidual).data)),
-        status_(batch.num_envs(), 0),
-        residual_(batch.num_envs(), 0) {}
-  /// Adds what the last part left in the batch's arrays.
-  void add() {
-    for (std::size_t k = 0; k < status_.size(); ++k) {
-      status_[k] |= now_status_[k];
-      residual_[k] = std::max(residual_[k], now_residual_[k]);
-    }
-  }
-  /// Leaves there what all parts said.
-  void write() const {
-    std::copy(status_.begin(), status_.end(), now_status_);
-    std::copy(residual_.begin(), residual_.end(), now_residual_);
-  }
-
- private:
-  std::uint32_t* now_status_;
-  T* now_residual_;
-  std::vector<std::uint32_t> status_;
-  std::vector<T> residual_;
-};
-
-std::uint32_t step_part(Batch& batch, int steps) {
-  nb::gil_scoped_release free_interpreter;
-  return static_cast<std::uint32_t>(batch.step(steps));
-}
-
-/// Steps `part` by `part`; lets Ctrl-C through between them.
-template <class T>
-std::uint32_t step_in_parts(Batch& batch, int steps, int part) {
-  Report<T> report(batch);
-  std::uint32_t bits = 0;
-  bool interrupted = false;
-  for (int left = steps; left > 0 && !interrupted; left -= part) {
-    bits |= step_part(batch, std::min(left, part));
-    report.add();
-    interrupted = PyErr_CheckSignals() != 0;
-  }
-  report.write();
-  if (interrupted) throw nb::python_error();
-  return bits;
-}
-
-/// Without the GIL. Long runs are cut so that Ctrl-C is heard within a second or so.
+/// Without the GIL. Between parts of a long run Ctrl-C is heard.
 std::uint32_t step(Batch& batch, int steps) {
-  constexpr int kRobotStepsBetweenSignals = 1 << 18;
-  const int part = std::max(1, kRobotStepsBetweenSignals / batch.num_envs());
-  if (steps <= part) return step_part(batch, steps);
-  return batch.precision() == Precision::kFloat64 ? step_in_parts<double>(batch, steps, part)
-                                                  : step_in_parts<float>(batch, steps, part);
+  const auto no_signal = [] {
+    const nb::gil_scoped_acquire interpreter;
+    return PyErr_CheckSignals() == 0;
+  };
+  std::uint32_t bits;
+  {
+    const nb::gil_scoped_release free_interpreter;
+    bits = static_cast<std::uint32_t>(batch.step(steps, no_signal));
+  }
+  if (PyErr_Occurred()) throw nb::python_error();
+  return bits;
 }
 
 void reset(Batch& batch, const IndicesIn& envs, const VectorIn& q, const VectorIn& u) {

@@ -19,6 +19,17 @@ def number(name: str, value: Any) -> float:
     return result
 
 
+def interval(name: str, value: Any) -> tuple[float, float]:
+    """Bounds (low, high), low <= high; they may be infinite."""
+    try:
+        low, high = map(float, value)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name} is {value!r}; a pair of numbers (low, high) is wanted") from None
+    if not low <= high:
+        raise ValueError(f"{name} is {(low, high)}; low must not exceed high")
+    return low, high
+
+
 LARGEST_COUNT = 2**31 - 1  # the core counts in 32 bits
 
 

@@ -79,7 +79,10 @@ def environments(name: str, where: Any, num_envs: int) -> NDArray[np.int64]:
     if len(found) < len(indices):
         twice = np.argmax(times > 1)
         again = np.flatnonzero(indices == found[twice])[1]
-        raise ValueError(f"{name}[{again}] is {found[twice]}, as is {name}[{first[twice]}]; name an environment once")
+        hint = "; a mask must be bool" if len(indices) == num_envs and found[-1] <= 1 else ""
+        raise ValueError(
+            f"{name}[{again}] is {found[twice]}, as is {name}[{first[twice]}]; name an environment once{hint}"
+        )
     return indices
 
 

@@ -6,6 +6,7 @@ set or its neighbors. In float64 they are those of a `World`.
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -24,6 +25,7 @@ from stickslip.world import World
 __all__ = ["Batch", "ContactPoint"]
 
 Array = NDArray[Any]
+_PARAMETERS = ("kp", "kd", "friction", "gravity", "body_mass", "body_com", "body_inertia")
 _PRECISIONS = ("float32", "float64")
 
 
@@ -102,6 +104,22 @@ class Batch:
         return (
             f"<stickslip.Batch of {self.num_envs} {self.model.name!r} in {self.dtype.name}: {self.width} lanes "
             f"({self.instruction_set}), threads: {self.num_threads}>"
+        )
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if not name.startswith("_"):
+            self._check_settable(name)
+        try:
+            object.__setattr__(self, name, value)
+        except (AttributeError, TypeError, ValueError) as error:
+            if not isinstance(value, np.ndarray) or value is not self._views.get(name):
+                raise
+            raise type(error)(f"{error}; an operator such as += has put its result into the array already") from None
+
+    def __reduce__(self) -> Any:
+        raise TypeError(  # for copy, deepcopy and pickle alike
+            "a Batch can be neither copied nor pickled; make another one of the same world, and pass the state with "
+            "save_state() and load_state()"
         )
 
     # What it is
@@ -318,6 +336,12 @@ class Batch:
     def body_inertia(self, value: ArrayLike) -> None:
         self._assign("body_inertia", value, (len(self._bodies.names), 6), self._check_inertias)
 
+    def has_own(self, name: str) -> bool:
+        """Whether a parameter, such as "kp", is each environment's own, because it was read or assigned."""
+        if name not in _PARAMETERS:
+            raise ValueError(f"name is {name!r}; choose one of {', '.join(map(repr, _PARAMETERS))}")
+        return name in self._views
+
     # Running
 
     def step(self, steps: int = 1) -> StepStatus:
@@ -328,8 +352,10 @@ class Batch:
         """
         return StepStatus(self._core.step(count("steps", steps)))
 
-    def flagged(self, status: StepStatus) -> NDArray[np.int64]:
-        """(k,) indices of environments whose status of the last `step` call has any of these bits."""
+    def flagged(self, status: StepStatus | None = None) -> NDArray[np.int64]:
+        """(k,) indices of environments whose status of the last `step` call has any of these bits; None: any at all."""
+        if status is None:
+            return np.flatnonzero(self.status)
         return np.flatnonzero(self.status & np.uint32(count("status", status)))
 
     def reset(self, where: ArrayLike | None = None, q: ArrayLike | None = None, u: ArrayLike | None = None) -> None:
@@ -379,6 +405,13 @@ class Batch:
         self._core.reset_stage_times()
 
     # Memory and checks
+
+    def _check_settable(self, name: str) -> None:
+        """A mistyped name would be set and never read."""
+        if hasattr(type(self), name):
+            return
+        near = difflib.get_close_matches(name, [known for known in dir(type(self)) if not known.startswith("_")], 1)
+        raise AttributeError(f"a Batch has no {name!r}" + (f"; did you mean {near[0]!r}?" if near else ""))
 
     def _view(self, name: str) -> Array:
         """The one view of an array."""

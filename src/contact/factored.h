@@ -117,11 +117,10 @@ STICKSLIP_STAGE S certify(FactoredProblem<S>& p) {
   }
 }
 
-/// Sweeps and Newton steps until the change is small in every lane; returns the lanes that are
-/// still above.
+/// Sweeps and Newton steps until the change is small in every lane of `live`, or the cap.
 template <int M, bool kMaxDissipation, class S>
-STICKSLIP_INLINE Mask<S> iterate(FactoredProblem<S>& p, Mask<S> live, S tolerance_squared,
-                                 const FactoredOptions& o, FactoredInfo<S>& info) {
+STICKSLIP_INLINE void iterate(FactoredProblem<S>& p, Mask<S> live, S tolerance_squared,
+                              const FactoredOptions& o, FactoredInfo<S>& info) {
   const S speed = constant<S>(0.1) * sqrt(tolerance_squared);
   S before = constant<S>(1e30);
   const int cap = kMaxDissipation ? 100 * o.max_sweeps : o.max_sweeps;
@@ -129,7 +128,7 @@ STICKSLIP_INLINE Mask<S> iterate(FactoredProblem<S>& p, Mask<S> live, S toleranc
     const S change = sweep<M, kMaxDissipation>(p, live, speed);
     live = live & (change > tolerance_squared);
     ++info.sweeps;
-    if (!any(live) || k >= cap) return live;
+    if (!any(live) || k >= cap) return;
     if (!kMaxDissipation && k >= 2) {
       const bool late = k >= 5;
       const auto slow = late ? live : live & (change * change > tolerance_squared * before);
@@ -192,18 +191,19 @@ __attribute__((noinline)) void run_fallback(FactoredProblem<S>& p, Mask<S> lanes
 }
 
 /// Of the lanes that are not solved, those that jam get a bounded answer that does not sink
-/// (jam.h).
+/// (jam.h). False if there are none.
 template <int M, bool kMaxDissipation, class S>
-__attribute__((noinline)) void release_jams(FactoredProblem<S>& p, Mask<S> bad, S fastest,
+__attribute__((noinline)) bool release_jams(FactoredProblem<S>& p, Mask<S> bad, S fastest,
                                             S allowed) {
   const JamLimits<S> limits = jam_limits(fastest, allowed);
   const auto jammed = bad & jammed_lanes(p, limits);
-  if (!any(jammed)) return;
+  if (!any(jammed)) return false;
   improve_lanes<M>(p, jammed, [&](FactoredProblem<double>& q, int lane) {
     const JamLimits<double> one = {double(get_lane(limits.impulse, lane)),
                                    double(get_lane(limits.sinking, lane))};
     JamRelease<M, kMaxDissipation>(q, one, double(get_lane(allowed, lane))).run();
   });
+  return true;
 }
 
 template <int M, bool kMaxDissipation, class S>
@@ -231,26 +231,26 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
       min(madd(relative * relative, fastest, absolute * absolute), allowed * allowed);
   // False for NaN, and where products of block entries would overflow.
   const auto finite = sum < constant<S>(sizeof(Value<S>) == 4 ? 1e14 : 1e30);
-  auto open = iterate<M, kMaxDissipation>(p, finite, tolerance_squared, o, info);
-  S worst = certify<M, kMaxDissipation>(p);
-  auto bad = finite & !(worst <= allowed);
-  if (any(bad)) {
-    if (!kMaxDissipation && o.fallback) {
-      run_fallback<M>(p, bad, allowed * constant<S>(0.9), info);
-      worst = certify<M, kMaxDissipation>(p);
-      bad = finite & !(worst <= allowed);
-      if (sizeof(Value<S>) == 4 && any(bad)) {
-        worst = select(bad, certify_in_double<M>(p, bad), worst);
-        bad = finite & !(worst <= allowed);
-      }
+  iterate<M, kMaxDissipation>(p, finite, tolerance_squared, o, info);
+  // Which of the lanes are not solved. The residuals of others stay: float would evaluate them anew
+  // without double's help.
+  S worst = zero;
+  const auto unsolved = [&](Mask<S> lanes) {
+    worst = select(lanes, certify<M, kMaxDissipation>(p), worst);
+    auto bad = lanes & !(worst <= allowed);
+    if (sizeof(Value<S>) == 4 && !kMaxDissipation && any(bad)) {
+      worst = select(bad, certify_in_double<M>(p, bad), worst);
+      bad = bad & !(worst <= allowed);
     }
-    if (any(bad)) {
-      release_jams<M, kMaxDissipation>(p, bad, sqrt(fastest), allowed);
-      // Not of lanes that float would call unsolved again.
-      worst = select(bad, certify<M, kMaxDissipation>(p), worst);
-    }
+    return bad;
+  };
+  auto bad = unsolved(finite);
+  if (any(bad) && !kMaxDissipation && o.fallback) {
+    run_fallback<M>(p, bad, allowed * constant<S>(0.9), info);
+    bad = unsolved(bad);
   }
-  (void)open;
+  if (any(bad) && release_jams<M, kMaxDissipation>(p, bad, sqrt(fastest), allowed)) unsolved(bad);
+  worst = select(finite, worst, constant<S>(__builtin_nan("")));
   info.residual = worst;
   info.allowed = allowed;
   info.converged = finite & (worst <= allowed);

@@ -7,7 +7,7 @@
 namespace stickslip::dynamics::inline STICKSLIP_KERNELS {
 
 /// Which forces besides the joint forces act in `solve_lower_transposed`.
-enum class LinkForces { kNone, kBaseOnly, kAll };
+enum class LinkForces { kNone, kAll };
 
 /// x = L^-T (tau + forces on links), into links[].x and base.x. `tau` (num_joints) may be null;
 /// `forces` says whether base.force and links[].force take part.
@@ -15,7 +15,6 @@ template <class S>
 void solve_lower_transposed(Tree<S>& t, const S* tau, LinkForces forces) {
   WalkInput<S> in;
   in.tau = tau;
-  if (forces == LinkForces::kBaseOnly) in.base_force = &t.base.force;
   if (forces == LinkForces::kAll)
     walk<kSolveTransposed | kLinkForces>(t, in);
   else

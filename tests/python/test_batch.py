@@ -814,3 +814,85 @@ def test_profiling_counts_robot_steps_only_while_it_is_on() -> None:
     assert batch.stage_times.steps == 100
     batch.reset_stage_times()
     assert batch.stage_times.steps == 0
+
+
+def test_forked_process_steps_on_with_the_same_bits() -> None:
+    batch = ss.Batch(anymal(), 40, "float64", num_threads=2)
+    batch.reset(None, *scattered_states(40))
+    batch.step(5)
+    start = batch.save_state()
+    batch.step(5)
+    expected = batch.q.tobytes()
+    batch.load_state(start)
+    read, write = os.pipe()
+    child = os.fork()
+    if child == 0:  # nothing of pytest may run here
+        batch.step(5)
+        os.write(write, b"1" if batch.q.tobytes() == expected else b"0")
+        os._exit(0)
+    os.waitpid(child, 0)
+    assert os.read(read, 1) == b"1"
+    os.close(read)
+    os.close(write)
+
+
+def test_two_threads_on_one_batch_are_told() -> None:
+    batch = ss.Batch(anymal(), 64, num_threads=2)
+    errors: list[str] = []
+
+    def work() -> None:
+        for _ in range(20):
+            try:
+                batch.step(20)
+            except ValueError as error:
+                errors.append(str(error))
+
+    threads = [threading.Thread(target=work) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(60)
+    assert not any(thread.is_alive() for thread in threads)
+    assert errors and all("another thread is at work on this batch" in error for error in errors)
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_target_that_is_not_finite_flags_whoever_the_neighbors_are(integrator: str) -> None:
+    world = anymal(integrator=integrator)
+    world.robots[0].set_pd_gains(0.0, 0.0)
+    outcomes = []
+    for neighbor in ("plain", "gains", "force", "wrench"):
+        batch = ss.Batch(world, 2)
+        batch.pd_target[0, 3] = np.nan
+        if neighbor == "gains":
+            batch.kp[1] = 50.0
+        elif neighbor == "force":
+            batch.generalized_force[1, 8] = 1.0
+        elif neighbor == "wrench":
+            batch.external_wrench[1, 0, 2] = 1.0
+        batch.step(20)
+        outcomes.append((int(batch.status[0]), batch.q[0].tobytes(), batch.u[0].tobytes()))
+    assert outcomes[0][0] == int(ss.StepStatus.NON_FINITE)
+    assert all(outcome == outcomes[0] for outcome in outcomes)
+
+
+def test_state_that_is_none_is_set_aside_for_the_whole_call() -> None:
+    # Long calls are cut into parts, more of them for more environments.
+    outcomes = []
+    for num_envs in (1, 1024):
+        batch = ss.Batch(anymal(), num_envs)
+        batch.q[0, 2] = np.nan
+        assert ss.StepStatus.NON_FINITE in batch.step(600)
+        outcomes.append((int(batch.status[0]), float(batch.time[0]), batch.q[0].tobytes()))
+    assert outcomes[0] == outcomes[1]
+    assert outcomes[0][0] == int(ss.StepStatus.NON_FINITE)
+
+
+def test_wrench_on_a_fixed_base_moves_nothing() -> None:
+    plain, pulled = (ss.Batch(arm(integrator="energy_safe"), 3, "float64") for _ in range(2))
+    for batch in (plain, pulled):
+        batch.kp[:], batch.kd[:] = 0.0, 0.0
+    pulled.external_wrench[:, 0] = 100.0
+    plain.step(100)
+    pulled.step(100)
+    assert_same_bits(plain, pulled, ("q", "u", *OUTPUTS))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
@@ -297,3 +300,51 @@ def test_status_to_look_for_is_made_of_bits(batch: ss.Batch) -> None:
         batch.flagged("NON_FINITE")
     with pytest.raises(ValueError, match="status is -1"):
         batch.flagged(-1)
+
+
+# Objects
+
+
+@pytest.mark.parametrize("act", [copy.copy, copy.deepcopy, pickle.dumps])
+def test_copies_are_refused_with_advice(batch: ss.Batch, act) -> None:
+    with pytest.raises(TypeError, match="neither copied nor pickled; make another one .* save_state"):
+        act(batch)
+
+
+def test_mistyped_names_are_refused(batch: ss.Batch) -> None:
+    with pytest.raises(AttributeError, match="a Batch has no 'pd_targets'; did you mean 'pd_target'"):
+        batch.pd_targets = 0.0
+    with pytest.raises(AttributeError, match="a Batch has no 'zzz'$"):
+        batch.zzz = 0.0
+
+
+def test_operators_in_place_say_that_their_result_stays(batch: ss.Batch) -> None:
+    with pytest.raises(ValueError, match=r"kp: environment 0.* is -.*has put its result into the array already"):
+        batch.kp -= 1000.0
+    assert (batch.kp < 0).all()
+    with pytest.raises(AttributeError, match="'time'.*has put its result into the array already"):
+        batch.time += 1.0
+    with pytest.raises(ValueError, match="must be zero or positive$"):
+        batch.kp = -1.0
+
+
+def test_masks_of_integers_are_recognized(batch: ss.Batch) -> None:
+    with pytest.raises(ValueError, match="name an environment once; a mask must be bool"):
+        batch.reset([1, 0, 0, 1, 0])
+    with pytest.raises(ValueError, match="name an environment once$"):
+        batch.reset([1, 1])
+
+
+def test_parameters_are_own_once_they_are_used(batch: ss.Batch) -> None:
+    assert not batch.has_own("kp")
+    batch.kp = 3.0
+    assert batch.has_own("kp") and not batch.has_own("kd")
+    with pytest.raises(ValueError, match="name is 'pd_target'; choose one of 'kp', 'kd'"):
+        batch.has_own("pd_target")
+
+
+def test_flagged_means_any_bit_unless_told(batch: ss.Batch) -> None:
+    batch.generalized_force[2] = np.nan
+    batch.step()
+    assert batch.flagged().tolist() == np.flatnonzero(batch.status).tolist()
+    assert 2 in batch.flagged()

@@ -18,6 +18,8 @@ from gymnasium.wrappers import vector as wrappers
 import stickslip as ss
 from env_runs import ID, MODES, actions_of, assert_same_steps, lively, make, run
 from stickslip.envs import AnymalFlat, AnymalFlatConfig, rewards
+from stickslip.envs.commands import Commands
+from stickslip.envs.randomization import Pushes
 
 if not hasattr(ss, "Batch"):
     pytest.skip("needs stickslip.Batch", allow_module_level=True)
@@ -63,7 +65,7 @@ def test_importing_stickslip_does_not_import_gymnasium() -> None:
 def test_missing_gymnasium_is_named_with_its_remedy() -> None:
     code = "import sys; sys.modules['gymnasium'] = None; import stickslip.envs"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert result.returncode == 1 and "pip install 'stickslip[gym]'" in result.stderr
+    assert result.returncode == 1 and "pip install '.[gym]'" in result.stderr
 
 
 def test_specification_survives_json() -> None:
@@ -413,6 +415,30 @@ def test_actions_are_clipped_to_their_space() -> None:
         ({"config": {"kp": 3}}, TypeError, "config is a dict; an AnymalFlatConfig"),
         ({"config": AnymalFlatConfig(stance={"LF_HAA": 0.0})}, ValueError, "stance must have one angle for each"),
         ({"config": AnymalFlatConfig(rewards={"alive": rewards.alive})}, TypeError, "rewards: 'alive'"),
+        ({"config": AnymalFlatConfig(commands={"forward": (0, 1)})}, TypeError, "commands is a dict; a .*Commands is"),
+        (
+            {"config": AnymalFlatConfig(commands=Commands(left=(1, -1)))},
+            ValueError,
+            "commands.left is .1.0, -1.0.; low",
+        ),
+        ({"config": AnymalFlatConfig(commands=Commands(yaw_rate=1.0))}, TypeError, "commands.yaw_rate is 1.0; a pair"),
+        (
+            {"config": AnymalFlatConfig(commands=Commands(forward=(0, np.inf)))},
+            ValueError,
+            "commands.forward .* finite",
+        ),
+        (
+            {"config": AnymalFlatConfig(commands=Commands(seconds=0.0))},
+            ValueError,
+            "commands.seconds is 0.0; it must be",
+        ),
+        ({"config": AnymalFlatConfig(pushes=5.0)}, TypeError, "pushes is a float; a .*Pushes or None is wanted"),
+        ({"config": AnymalFlatConfig(pushes=Pushes(seconds=(2, 1)))}, ValueError, "pushes.seconds is .2.0, 1.0.; low"),
+        (
+            {"config": AnymalFlatConfig(pushes=Pushes(seconds=(0, 1)))},
+            ValueError,
+            "pushes.seconds is .0, 1.; it must be",
+        ),
         ({"config": AnymalFlatConfig(decimation=0)}, ValueError, "decimation is 0"),
     ],
 )

@@ -77,6 +77,40 @@ def test_mistakes_in_a_task_are_named(change: dict[str, Any], error: type, words
         envs.step(np.zeros((3, 1)))
 
 
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
+def test_reward_that_is_not_finite_ends_that_episode_only(mode: str) -> None:
+    def terms(self: VectorTask) -> dict[str, np.ndarray]:
+        return {"one": np.ones(3), "bad": np.where(self.actions[:, 0] < 0, np.nan, 1.0)}
+
+    envs = type("Bad", (Falling,), {"rewards": terms})(3, autoreset_mode=mode)
+    envs.reset(seed=0)
+    envs.step(np.ones((3, 1)))
+    _, reward, terminated, _, infos = envs.step([[1.0], [-1.0], [1.0]])
+    assert reward.tolist() == [2, 0, 2] and terminated.tolist() == [False, True, False]
+    for told in (infos, infos["final_info"]) if mode == "SameStep" else (infos,):
+        assert told["_non_finite_reward"].tolist() == [False, True, False]
+        assert told["non_finite_reward"]["bad"].tolist() == [False, True, False]
+        assert not told["non_finite_reward"]["one"].any()
+    ended = infos["final_info"] if mode == "SameStep" else infos
+    assert ended["reward_terms"]["one"][1] == ended["reward_terms"]["bad"][1] == 1.0
+
+
+def test_terms_may_be_lists() -> None:
+    lists = {"rewards": lambda self: [1, 2, 3], "terminations": lambda self: [False, True, False]}
+    envs = type("Lists", (Falling,), lists)(3)
+    envs.reset(seed=0)
+    _, reward, terminated, _, infos = envs.step(np.zeros((3, 1)))
+    assert reward.tolist() == [1, 2, 3] and terminated.tolist() == [False, True, False]
+    assert infos["termination_terms"]["terminated"].tolist() == [False, True, False]
+
+
+def test_unknown_arguments_are_named_beside_those_of_the_task() -> None:
+    with pytest.raises(
+        TypeError, match=r"Falling has no argument foo; it takes num_envs, .*pin_threads, instruction_set"
+    ):
+        Falling(3, foo=1)
+
+
 def test_example_jumps(capsys) -> None:
     module = SimpleNamespace(**runpy.run_path(str(ROOT / "examples" / "write_your_own_task.py")))
     module.check()

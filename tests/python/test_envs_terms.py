@@ -176,6 +176,34 @@ def test_commands_change_when_their_time_is_over() -> None:
     assert np.flatnonzero(changes).tolist() == [4, 9]
 
 
+@pytest.mark.parametrize("seconds", [1e12, np.inf])
+def test_long_intervals_mean_never(seconds: float) -> None:
+    config = quiet()
+    config.commands = commands.Commands(seconds=seconds)
+    config.pushes = randomization.Pushes(seconds=(seconds, seconds))
+    envs = make(3, config=config)
+    envs.reset(seed=0)
+    assert (envs._command_steps > 2**30).all() and (envs._push_steps > 2**30).all()
+    drawn = envs.commands.copy()
+    envs.step(np.zeros((3, 12)))
+    assert (envs.commands == drawn).all()
+
+
+def test_torque_is_of_the_gains_of_each_environment() -> None:
+    envs = make(2, config=quiet())
+    envs.reset(seed=0)
+    envs.step(np.ones((2, 12)))
+    assert not envs.batch.has_own("kp") and envs.state.kp == 80.0
+    envs.batch.kp[1] = 40.0
+    envs.batch.kd[1] = 1.0
+    envs.step(np.ones((2, 12)))
+    state = envs.state
+    error = state.joint_target - state.joint_position
+    assert np.allclose(state.joint_torque[0], 80.0 * error[0] - 2.0 * state.joint_velocity[0], atol=1e-4)
+    assert np.allclose(state.joint_torque[1], 40.0 * error[1] - state.joint_velocity[1], atol=1e-4)
+    assert state.rows(np.array([1])).joint_torque.shape == (1, 12)
+
+
 def test_each_episode_draws_friction_and_mass() -> None:
     envs = make(50, config=AnymalFlatConfig())
     envs.reset(seed=0)

@@ -10,7 +10,7 @@ try:
     import gymnasium
     from gymnasium.vector import AutoresetMode
 except ImportError as error:
-    raise ImportError("stickslip.envs needs Gymnasium 1.1 or newer: pip install 'stickslip[gym]'") from error
+    raise ImportError("stickslip.envs needs Gymnasium 1.1 or newer: pip install '.[gym]' in a checkout") from error
 
 from stickslip.envs import commands, observations, randomization, rewards, terminations
 from stickslip.envs.anymal_flat import AnymalFlat, AnymalFlatConfig

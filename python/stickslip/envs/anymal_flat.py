@@ -24,6 +24,7 @@ from stickslip.world import World
 
 __all__ = ["AnymalFlat", "AnymalFlatConfig", "AnymalFlatEnv"]
 
+LONGEST = np.iinfo(np.int32).max  # control steps to the next push or command: never
 FOOT_FORCE = 1.0  # from which vertical force on it a point counts as touching, as legged_gym [N]
 
 
@@ -78,6 +79,15 @@ class AnymalFlat(VectorTask):
         for name, term in c.rewards.items():
             if not isinstance(term, tuple) or len(term) != 2 or not callable(term[1]):
                 raise TypeError(f"rewards: {name!r} is {term!r}; a tuple (weight, function) is wanted")
+        if not isinstance(c.commands, Commands):
+            raise TypeError(f"commands is a {type(c.commands).__name__}; a stickslip.envs.commands.Commands is wanted")
+        c.commands.check()
+        if not isinstance(c.pushes, (Pushes, type(None))):
+            raise TypeError(
+                f"pushes is a {type(c.pushes).__name__}; a stickslip.envs.randomization.Pushes or None is wanted"
+            )
+        if c.pushes is not None:
+            c.pushes.check()
         self.time_step, self.decimation, self.episode_seconds = c.time_step, c.decimation, c.episode_seconds
         self.action_limit, self.observation_limit = c.action_limit, c.observation_limit
         self.only_positive_rewards = c.only_positive_rewards
@@ -137,7 +147,7 @@ class AnymalFlat(VectorTask):
 
     @property
     def commands(self) -> Array:
-        """(num_envs, 3) velocity forward, to the left [m/s], yaw rate [rad/s]; write here to steer."""
+        """(num_envs, 3) velocity forward, to the left [m/s], yaw rate [rad/s]; write here to steer until the next draw."""
         return self.state.commands
 
     # Episodes
@@ -159,11 +169,12 @@ class AnymalFlat(VectorTask):
 
     def _draw_commands(self, envs: NDArray[np.int64]) -> None:
         self.state.commands[envs] = self.config.draw_commands(self.random, envs, self.config.commands)
-        self._command_steps[envs] = round(self.config.commands.seconds / self.step_seconds)
+        self._command_steps[envs] = round(min(self.config.commands.seconds / self.step_seconds, LONGEST))
 
     def _draw_push_times(self, envs: NDArray[np.int64]) -> None:
-        seconds = self.random.uniform(envs, *self.config.pushes.seconds)
-        self._push_steps[envs] = np.rint(seconds / np.float32(self.step_seconds)).astype(np.int32)
+        low, high = np.minimum(self.config.pushes.seconds, LONGEST * self.step_seconds)
+        steps = np.rint(self.random.uniform(envs, low, high) / np.float32(self.step_seconds))
+        self._push_steps[envs] = np.minimum(steps.astype(np.float64), LONGEST).astype(np.int32)
 
     # Steps
 
@@ -186,6 +197,10 @@ class AnymalFlat(VectorTask):
     def refresh(self, envs: Envs) -> None:
         """Base and joints as the terms want them."""
         self.state.actions, self.state.previous_actions = self.actions, self.previous_actions
+        if self.batch.has_own("kp"):
+            self.state.kp = self.batch.kp
+        if self.batch.has_own("kd"):
+            self.state.kd = self.batch.kd
         if isinstance(envs, slice):
             self.state.measure(self.batch.q, self.batch.u, self._angles)
             return

@@ -59,8 +59,8 @@ class LocomotionState:
     base_contact: Mask  #: (n,)
     undesired_contacts: Array  #: (n,) bodies other than feet that touch the ground
     step_seconds: float  #: control step [s]
-    kp: float  #: PD gains [N m/rad]
-    kd: float  #: [N m s/rad]
+    kp: float | NDArray[Any]  #: PD gains, (n, joints) where they differ [N m/rad]
+    kd: float | NDArray[Any]  #: [N m s/rad]
 
     @classmethod
     def zeros(cls, num_envs: int, joints: int, feet: int, **constants: float) -> LocomotionState:
@@ -98,8 +98,8 @@ class LocomotionState:
     def joint_torque(self) -> Array:
         """(n, joints) of the PD control, at the end of the control step [N m]."""
         torque = self.joint_target - self.joint_position
-        torque *= np.float32(self.kp)
-        torque -= np.float32(self.kd) * self.joint_velocity
+        torque *= np.asarray(self.kp, np.float32)
+        torque -= np.asarray(self.kd, np.float32) * self.joint_velocity
         return torque
 
     @property

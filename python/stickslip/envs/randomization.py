@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip._arguments import interval
+
 if TYPE_CHECKING:
     from stickslip.envs.anymal_flat import AnymalFlat
 
@@ -61,8 +63,13 @@ def push(task: AnymalFlat, envs: Indices, speed: float = 0.5) -> None:
 class Pushes:
     """When and how robots are pushed."""
 
-    seconds: tuple[float, float] = (10.0, 15.0)  #: from the begin of an episode or the last push to the next [s]
+    seconds: tuple[float, float] = (10.0, 15.0)  #: since the beginning or the last push [s]; infinite: never
     function: Randomization = push
+
+    def check(self) -> None:
+        """TypeError or ValueError names the field that cannot be."""
+        if not interval("pushes.seconds", self.seconds)[0] > 0:
+            raise ValueError(f"pushes.seconds is {self.seconds}; it must be positive")
 
 
 def default_randomization() -> dict[str, Randomization]:

@@ -1,4 +1,4 @@
-"""A task as the environment that rsl_rl, the trainer of the legged-robot community, expects. Needs `stickslip[train]`.
+"""A task as the environment that rsl_rl, the trainer of the legged-robot community, expects. Needs the extra `train`.
 
 task = gymnasium.make_vec("stickslip/AnymalFlat-v0", num_envs=1024, autoreset_mode="SameStep")
 runner = rsl_rl.runners.OnPolicyRunner(RslRlVecEnv(task), config)
@@ -14,7 +14,9 @@ try:
     from rsl_rl.env import VecEnv
     from tensordict import TensorDict
 except ImportError as error:
-    raise ImportError("stickslip.envs.rsl_rl needs rsl-rl-lib and PyTorch: pip install 'stickslip[train]'") from error
+    raise ImportError(
+        "stickslip.envs.rsl_rl needs rsl-rl-lib and PyTorch: pip install '.[train]' in a checkout"
+    ) from error
 
 import numpy as np
 from gymnasium.vector import AutoresetMode

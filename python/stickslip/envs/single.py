@@ -16,7 +16,10 @@ __all__ = ["SingleTask", "single"]
 
 
 class SingleTask(gymnasium.Env):
-    """A `gymnasium.Env` that steps `task_class` with one environment; options are those of the task."""
+    """A `gymnasium.Env` that steps `task_class` with one environment; options are those of the task, without `autoreset_mode`.
+
+    Episodes last the task's `episode_seconds`; `max_episode_steps` of `gymnasium.make` is Gymnasium's own, shorter limit.
+    """
 
     task_class: type[VectorTask]
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012

@@ -6,6 +6,7 @@ A new task is one class (docs/write_your_own_task.md): `make_world`, `apply`, `o
 
 from __future__ import annotations
 
+import inspect
 import operator
 from collections.abc import Sequence
 from typing import Any
@@ -34,7 +35,8 @@ class VectorTask(VectorEnv):
     """A Gymnasium vector environment on one `stickslip.Batch`. Arrays have one row per environment.
 
     num_envs: environments. autoreset_mode: a `gymnasium.vector.AutoresetMode`, or its value ("NextStep", "SameStep",
-    "Disabled"). max_episode_steps: instead of what `episode_seconds` gives. dtype, num_threads, batch_options: of the `Batch`.
+    "Disabled"). max_episode_steps: instead of what `episode_seconds` gives; a single environment has the latter.
+    dtype, num_threads, batch_options: of the `Batch`.
 
     Attributes for the methods of a task: `batch`, `world` and `robot` (which the batch was made of), `random` (one stream per
     environment), `actions` and `previous_actions` (num_envs, action_size), `episode_steps` (num_envs,), `step_seconds`.
@@ -126,6 +128,7 @@ class VectorTask(VectorEnv):
     def _make_batch(self, dtype: str, num_threads: int, options: dict[str, Any]) -> None:
         from stickslip.batch import Batch
 
+        _check_options(type(self), options)
         self.world = self.make_world()
         self.robot = self.world.robots[0] if self.world.robots else None
         self.batch = Batch(self.world, self.num_envs, dtype, num_threads, **options)
@@ -179,8 +182,8 @@ class VectorTask(VectorEnv):
     def step(self, actions: ArrayLike) -> tuple[Array, Array, Mask, Mask, dict[str, Any]]:
         """One action (num_envs, action_size) for every environment.
 
-        An environment whose action or state is not finite is terminated with reward zero and named in the infos
-        "invalid_action" or "non_finite"; the others do not notice. Infos of an ended episode: "reward_terms" (sums),
+        An environment whose action (as float32, so not 1e300), state or reward is not finite is terminated with reward zero
+        and named in the infos "invalid_action", "non_finite" or "non_finite_reward"; the others do not notice. Infos of an ended episode: "reward_terms" (sums),
         "termination_terms", "episode_steps"; with "SameStep" they are in "final_info", beside "final_obs".
 
         TypeError or ValueError for actions that are no numbers or of another shape; ResetNeeded where `reset` is due.
@@ -195,7 +198,10 @@ class VectorTask(VectorEnv):
         self.refresh(ALL)
         self.episode_steps += live
         broken, infos = self._broken(invalid, live)
-        rewards = self._rewards(live & ~broken)
+        rewards, worthless = self._rewards(live & ~broken)
+        if worthless is not None:
+            infos |= worthless
+            broken |= worthless["_non_finite_reward"]
         causes, terminated = self._terminations(broken, live)
         truncated = live & ~terminated & (self.episode_steps >= self.max_episode_steps)
         done = terminated | truncated
@@ -241,27 +247,39 @@ class VectorTask(VectorEnv):
             broken |= invalid
         return broken, infos
 
-    def _rewards(self, counted: Mask) -> Array:
-        """The sum of the terms, which are added up over the episode; zero where nothing counts."""
+    def _rewards(self, counted: Mask) -> tuple[Array, dict[str, Any] | None]:
+        """The sum of the terms, which are added up over the episode; zero where nothing counts. And infos on whose sum is not
+        finite, and by which terms; None for nobody."""
         terms = self.rewards()
         if not isinstance(terms, dict):
             terms = {"reward": terms}
         total = np.zeros(self.num_envs, np.float32)
         everywhere = True if counted.all() else counted
+        worthless = None
+        with np.errstate(all="ignore"):  # what is not finite is found below
+            for name, term in terms.items():
+                self._check_term("rewards", name, term)
+                np.add(total, term, out=total, where=everywhere)
+            if not np.isfinite(total.sum()):  # finite only if all are, and much cheaper to see
+                bad = ~np.isfinite(total)
+                if bad.any():
+                    culprits = {name: ~np.isfinite(term) for name, term in terms.items()}
+                    worthless = vector_info({"non_finite_reward": culprits}, bad)
+                    everywhere = counted & ~bad
+                    total[bad] = 0.0
         for name, term in terms.items():
-            self._check_term("rewards", name, term)
             if name not in self._reward_sums:
                 self._reward_sums[name] = np.zeros(self.num_envs, np.float32)
             sums = self._reward_sums[name]
             np.add(sums, term, out=sums, where=everywhere)
-            np.add(total, term, out=total, where=everywhere)
-        return np.maximum(total, 0.0, out=total) if self.only_positive_rewards else total
+        return (np.maximum(total, 0.0, out=total) if self.only_positive_rewards else total), worthless
 
     def _terminations(self, broken: Mask, live: Mask) -> tuple[dict[str, Mask], Mask]:
         """Causes by name, and who has one."""
         causes = self.terminations()
         if not isinstance(causes, dict):
             causes = {"terminated": causes}
+        causes = {name: np.asarray(mask) for name, mask in causes.items()}
         terminated = broken.copy()
         for name, mask in causes.items():
             self._check_term("terminations", name, mask, np.bool_)
@@ -372,6 +390,20 @@ class VectorTask(VectorEnv):
             super().reset(seed=value)
             self.random.seed(value, envs if self._seeded else ALL)
         self._seeded = True
+
+
+def _check_options(task_class: type[VectorTask], options: dict[str, Any]) -> None:
+    """What no constructor of the task names must be an option of `Batch`."""
+    from stickslip.batch import Batch
+
+    named = [p for c in task_class.__mro__ if "__init__" in vars(c) for p in inspect.signature(c).parameters.values()]
+    batch = [p.name for p in inspect.signature(Batch).parameters.values() if p.kind is p.KEYWORD_ONLY]
+    unknown = ", ".join(sorted(set(options) - set(batch)))
+    if unknown:
+        known = [p.name for p in named if p.kind is not p.VAR_KEYWORD and p.name != "self"]
+        raise TypeError(
+            f"{task_class.__name__} has no argument {unknown}; it takes {', '.join(dict.fromkeys(known + batch))}"
+        )
 
 
 def _positive(name: str, value: Any) -> int:

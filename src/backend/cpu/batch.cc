@@ -85,13 +85,22 @@ std::size_t Batch::memory_bytes() const {
 
 BatchArray Batch::array(BatchField field) { return impl_->array(field); }
 
-StepStatus Batch::step(int steps) {
+StepStatus Batch::step(int steps, bool (*go_on)()) {
   if (steps < 0) reject(".step: the number of steps must be >= 0, got " + std::to_string(steps));
-  return static_cast<StepStatus>(impl_->step(steps));
+  const Impl::Hold hold(*impl_, "step");
+  // About a tenth of a second of one core.
+  const int part = go_on ? std::max(1, (1 << 18) / num_envs()) : std::max(1, steps);
+  std::uint32_t bits = 0;
+  for (int done = 0; done < steps; done += part) {
+    if (done > 0 && !go_on()) break;
+    bits |= impl_->step(std::min(part, steps - done), done > 0);
+  }
+  return static_cast<StepStatus>(bits);
 }
 
 void Batch::reset(std::span<const std::int64_t> envs, std::span<const double> q,
                   std::span<const double> u) {
+  const Impl::Hold hold(*impl_, "reset");
   const std::size_t nq = model().nq(), nu = model().nu(), n = envs.size();
   std::vector<bool> seen(num_envs());
   for (std::size_t k = 0; k < n; ++k) {

@@ -95,6 +95,13 @@ Batch::Impl::Impl(const World::Impl& world, const BatchOptions& o)
   }
 }
 
+Batch::Impl::Hold::Hold(Impl& batch, const char* what) : batch_(batch) {
+  if (batch_.held_.test_and_set())
+    throw ModelError(
+        std::string("Batch.") + what +
+        ": another thread is at work on this batch; a batch belongs to one thread at a time");
+}
+
 void Batch::Impl::fill_pack_scene() {
   constants.allocate(constants_bytes(layout, *kernels));
   if (kernels->single)
@@ -229,9 +236,9 @@ void Batch::Impl::step_pack(void* self, int thread, long pack) {
   if (bits) b.bits_.fetch_or(bits, std::memory_order_relaxed);
 }
 
-std::uint32_t Batch::Impl::step(int steps) {
-  if (steps == 0) return 0;
+std::uint32_t Batch::Impl::step(int steps, bool continues) {
   running_ = env_arrays();
+  running_.continues = continues;
   running_steps_ = steps;
   bits_ = 0;
   pool.run(padded / kernels->width, {&Impl::step_pack, this});
@@ -328,7 +335,13 @@ void Batch::Impl::load(std::span<const std::uint8_t> blob) {
     }
 }
 
-std::vector<std::uint8_t> Batch::save_state() const { return impl_->save(); }
-void Batch::load_state(std::span<const std::uint8_t> blob) { impl_->load(blob); }
+std::vector<std::uint8_t> Batch::save_state() const {
+  const Impl::Hold hold(*impl_, "save_state");
+  return impl_->save();
+}
+void Batch::load_state(std::span<const std::uint8_t> blob) {
+  const Impl::Hold hold(*impl_, "load_state");
+  impl_->load(blob);
+}
 
 }  // namespace stickslip

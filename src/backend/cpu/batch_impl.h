@@ -27,7 +27,19 @@ struct Batch::Impl {
     double stages[step::kNumStages] = {};
   };
 
-  std::uint32_t step(int steps);
+  /// `continues`: a later part of one call.
+  std::uint32_t step(int steps, bool continues);
+  /// Held while a batch changes. Throws ModelError where another thread holds it.
+  class Hold {
+   public:
+    Hold(Impl& batch, const char* what);
+    ~Hold() { batch_.held_.clear(); }
+    Hold(const Hold&) = delete;
+    Hold& operator=(const Hold&) = delete;
+
+   private:
+    Impl& batch_;
+  };
   BatchArray array(BatchField field);
   backend::EnvArrays env_arrays();
   void reset(long env, const double* q, const double* u);
@@ -69,6 +81,7 @@ struct Batch::Impl {
   void fill_start(const step::RobotData& robot);
   std::vector<std::uint64_t> signature() const;
 
+  std::atomic_flag held_;
   // Of the step that is running.
   backend::EnvArrays running_;
   int running_steps_ = 0;

@@ -1,6 +1,7 @@
 #include "backend/cpu/body_parameters.h"
 
 #include <cstring>
+#include <utility>
 
 namespace stickslip::backend {
 
@@ -12,9 +13,11 @@ void BodyParameters::allocate(BatchMemory& memory) {
   }
   const std::size_t per_link = static_cast<std::size_t>(kNumbers) * lanes() * number_bytes();
   const long packs = padded_ / kernels_.width;
-  links_.allocate(packs * layout_.num_slots * per_link);
-  base_.allocate(static_cast<std::size_t>(padded_) * kNumbers * number_bytes());
-  seen_.allocate(padded_ * row);
+  Block links, base, seen;  // all or none
+  links.allocate(packs * layout_.num_slots * per_link);
+  base.allocate(static_cast<std::size_t>(padded_) * kNumbers * number_bytes());
+  seen.allocate(padded_ * row);
+  links_ = std::move(links), base_ = std::move(base), seen_ = std::move(seen);
   for (long env = 0; env < padded_; ++env) {
     char* seen = seen_.data() + env * row;
     for (const BatchField f : kFields) {

@@ -4,6 +4,7 @@
 #pragma once
 #include <cstdint>
 
+#include "lane/lane.h"
 #include "step/step_tables.h"
 
 namespace stickslip::backend {
@@ -36,22 +37,26 @@ struct EnvArrays {
   Parameter kp, kd, friction, gravity;
   Parameter external_wrench;  // optional
   bool force;                 // generalized_force is in use
+  bool continues;             // a later part of one call: what was set aside stays so
   void* history;              // T, see PackHistory
 };
 
 /// What an environment carries from step to step besides q and u, per pack: T (numbers, lanes).
 /// Order: q and u that the last step left, warm-start impulses, drift acceleration, pending
-/// gravity, and whether the state is new (1) or of a step (0).
+/// gravity, whether the state is new (1) or of a step (0), whether the environment was set aside
+/// (1).
 struct PackHistory {
-  int q, u, impulse, drift, pending, fresh, numbers;  // first row of each
-  explicit PackHistory(const step::RobotTables& t)
+  int q, u, impulse, drift, pending, fresh, aside, numbers;  // first row of each
+  // Inline always: the host and every instruction set call it.
+  STICKSLIP_INLINE explicit PackHistory(const step::RobotTables& t)
       : q(0),
         u(t.nq),
         impulse(u + t.nu),
         drift(impulse + 3 * t.num_points),
         pending(drift + t.nu),
         fresh(pending + 1),
-        numbers(fresh + 1) {}
+        aside(fresh + 1),
+        numbers(aside + 1) {}
 };
 
 /// Mass properties of a pack's environments; null: the model's.

@@ -130,6 +130,11 @@ void PackLanes<S>::load(const EnvArrays& arrays, long first, long num_envs) {
   check_state();
   fresh_ = s.fresh;
   load_control(arrays, first);
+  if (arrays.continues) {
+    S aside = past[h.aside];
+    repeat(&aside, 1);
+    set_aside_ = set_aside_ | (aside > constant<S>(0.5));
+  }
   robot_.prepared_step = constant<S>(0);
   robot_.contacts.forget();
   unconverged_ = non_finite_ = step::none<S>();
@@ -185,6 +190,9 @@ void PackLanes<S>::load_control(const EnvArrays& arrays, long first) {
   for (int k = 0; k < t.num_shapes; ++k) set_aside_ = set_aside_ | !(friction_[k] >= zero);
   load_rows(rows(arrays.pd_target, t.num_joints, first), t.num_joints, target_);
   repeat(target_, t.num_joints);
+  // Else a target that is none would count or not, by whether a neighbor is driven.
+  for (int j = 0; j < t.num_joints; ++j)
+    set_aside_ = set_aside_ | !step::is_finite(abs(target_[j]));
   c.gravity = {gravity_[0], gravity_[1], gravity_[2]};
   const auto some = [&](S x) { return !((x >= zero) & (x <= zero)); };  // also NaN
   Mask<S> gains = step::none<S>(), forces = gains, on_base = gains, pushed = gains;
@@ -198,8 +206,12 @@ void PackLanes<S>::load_control(const EnvArrays& arrays, long first) {
     for (int k = 0; k < t.nu; ++k) force_[k] = zero;
   }
   load_wrenches(arrays, first);
-  if (c.wrenches)
-    for (int k = 0; k < 6 * t.num_bodies; ++k) pushed = pushed | some(scratch_[k]);
+  if (c.wrenches) {
+    // What pulls at a fixed base moves nothing.
+    for (int k = t.floating ? 0 : 6; k < 6 * t.num_bodies; ++k) pushed = pushed | some(scratch_[k]);
+    for (int k = 0; k < 6 * t.num_bodies; ++k)
+      set_aside_ = set_aside_ | !step::is_finite(abs(scratch_[k]));
+  }
   forces = forces | pushed;
   c.pd = any(gains);
   c.force = any(forces);
@@ -286,6 +298,7 @@ StatusBits PackLanes<S>::store(const EnvArrays& arrays, const step::StepSettings
   step::copy(s.drift_acceleration, t.nu, past + h.drift);
   past[h.pending] = s.pending_gravity;
   past[h.fresh] = select(s.fresh, one, zero);
+  past[h.aside] = select(set_aside_, one, zero);
 
   const step::LaneContacts<S>& last = robot_.last_contacts;
   store_rows(last.impulse, 3 * t.num_points, rows(arrays.contact_impulse, 3 * t.num_points, first));
@@ -298,11 +311,14 @@ StatusBits PackLanes<S>::store(const EnvArrays& arrays, const step::StepSettings
   StatusBits bits = 0;
   for (int lane = 0; lane < kWidth; ++lane) {
     const bool dropped = get_lane(set_aside_, lane);
-    const StatusBits status =
-        (get_lane(unconverged, lane) ? 1u : 0u) | (get_lane(non_finite, lane) ? 2u : 0u);
-    arrays.status[first + lane] = status;
+    StatusBits& status = arrays.status[first + lane];
+    if (!arrays.continues) status = 0;
+    status |= (get_lane(unconverged, lane) ? 1u : 0u) | (get_lane(non_finite, lane) ? 2u : 0u);
     if (first + lane < num_envs) bits |= status;
-    static_cast<T*>(arrays.residual)[first + lane] = dropped ? T(0) : get_lane(residual_, lane);
+    T& residual = static_cast<T*>(arrays.residual)[first + lane];
+    const T before = arrays.continues ? residual : T(0);
+    const T now = dropped ? T(0) : get_lane(residual_, lane);
+    residual = now > before ? now : before;
     // Step by step, as a world counts.
     const long done = dropped ? 0 : steps_ - long(get_lane(steps_failed_, lane));
     for (long k = 0; k < done; ++k) arrays.time[first + lane] += settings.time_step;

@@ -1,13 +1,40 @@
 #include "backend/cpu/thread_pool.h"
 
+#include <stickslip/errors.h>
+
 #include <algorithm>
 #include <chrono>
+#include <string>
+#include <system_error>
 #ifdef __linux__
 #include <sched.h>
 #endif
+#include <unistd.h>
 
 namespace stickslip::backend {
 namespace {
+
+/// While it lives, this thread rounds to nearest and keeps small numbers, whatever a library has
+/// set (PyTorch can flush them to zero): the bits of an environment may not depend on who steps it.
+class StandardRounding {
+ public:
+#if defined(__x86_64__)
+  StandardRounding() : before_(__builtin_ia32_stmxcsr()) { __builtin_ia32_ldmxcsr(0x1f80); }
+  ~StandardRounding() { __builtin_ia32_ldmxcsr(before_); }
+
+ private:
+  unsigned before_;
+#elif defined(__aarch64__)
+  StandardRounding() {
+    asm volatile("mrs %0, fpcr" : "=r"(before_));
+    asm volatile("msr fpcr, %0" : : "r"(0ul));
+  }
+  ~StandardRounding() { asm volatile("msr fpcr, %0" : : "r"(before_)); }
+
+ private:
+  unsigned long before_;
+#endif
+};
 
 // A worker that has just worked waits this long awake: steps follow each other within it, and
 // waking costs as much as stepping a thousand robots.
@@ -41,11 +68,29 @@ std::vector<int> usable_cores() {
   return cores;
 }
 
-ThreadPool::ThreadPool(int threads, bool pin) : cores_(usable_cores()), pin_(pin) {
-  for (int k = 1; k < threads; ++k) workers_.emplace_back([this, k] { serve(k); });
+ThreadPool::ThreadPool(int threads, bool pin)
+    : cores_(usable_cores()), pin_(pin), process_(getpid()) {
+  try {
+    for (int k = 1; k < threads; ++k) workers_.emplace_back([this, k] { serve(k); });
+  } catch (const std::system_error&) {
+    const std::size_t started = workers_.size() + 1;
+    stop_workers();
+    throw ModelError("Batch: the system lets this process have " + std::to_string(started) +
+                     " of " + std::to_string(threads) + " threads; use a smaller num_threads");
+  }
 }
 
+bool ThreadPool::forked() const { return process_ != getpid(); }
+
 ThreadPool::~ThreadPool() {
+  if (forked()) {  // handles of threads that are not here: they can be neither joined nor destroyed
+    new std::vector<std::thread>(std::move(workers_));
+    return;
+  }
+  stop_workers();
+}
+
+void ThreadPool::stop_workers() {
   {
     const std::lock_guard lock(mutex_);
     stop_ = true;
@@ -53,6 +98,7 @@ ThreadPool::~ThreadPool() {
   }
   start_.notify_all();
   for (std::thread& t : workers_) t.join();
+  workers_.clear();
 }
 
 void ThreadPool::pin_to_core(int thread) const {
@@ -67,6 +113,7 @@ void ThreadPool::pin_to_core(int thread) const {
 }
 
 void ThreadPool::take_items(int thread) {
+  const StandardRounding rounding;
   for (long item = next_.fetch_add(1, std::memory_order_relaxed); item < items_;
        item = next_.fetch_add(1, std::memory_order_relaxed))
     work_.call(work_.self, thread, item);
@@ -95,7 +142,7 @@ void ThreadPool::run(long items, Work work) {
   items_ = items;
   work_ = work;
   next_.store(0, std::memory_order_relaxed);
-  if (workers_.empty() || items < 2) {
+  if (workers_.empty() || items < 2 || forked()) {
     take_items(0);
     return;
   }

@@ -32,12 +32,15 @@ class ThreadPool {
 
  private:
   void serve(int thread);
+  void stop_workers();
   void take_items(int thread);
   void pin_to_core(int thread) const;
+  bool forked() const;
 
   std::vector<std::thread> workers_;
   std::vector<int> cores_;
   bool pin_;
+  long process_;
   std::mutex mutex_;
   std::condition_variable start_, finish_;
   std::atomic<unsigned long> round_{0};

@@ -1,0 +1,145 @@
+// Hashes of batches: the tasks in environments at different times of different episodes. How a
+// batch is run (pack, threads, places, a snapshot in the middle) must not show in them.
+#pragma once
+#include "backend/staggered_task.h"
+#include "tests/determinism/state_hash.h"
+
+namespace batch_hash {
+
+using namespace environments;
+
+constexpr int kEnvs = 20, kSteps = 400, kEvery = 100;  // steps between those that are hashed
+
+struct How {
+  std::string instruction_set = {};
+  int width = 0;
+  int threads = 1;
+  bool shuffled = false;  // environments in other places, beside other neighbors
+  bool reloaded = false;  // saved in the middle and gone on with in a new batch of another pack
+
+  BatchOptions options(Precision precision) const {
+    BatchOptions o = batch_options(kEnvs, precision, threads);
+    o.instruction_set = instruction_set;
+    o.width = width;
+    return o;
+  }
+  std::string text() const {
+    return instruction_set + " width " + std::to_string(width) + ", " + std::to_string(threads) +
+           " threads" + (shuffled ? ", shuffled" : "") + (reloaded ? ", reloaded" : "");
+  }
+};
+
+template <class T>
+std::uint64_t add(std::uint64_t hash, std::span<const T> values) {
+  const auto* bytes = reinterpret_cast<const unsigned char*>(values.data());
+  for (size_t k = 0; k < values.size_bytes(); ++k) hash = (hash ^ bytes[k]) * 0x100000001b3u;
+  return hash;
+}
+
+/// q, u and impulses of an environment; a zero impulse has no sign.
+template <class T>
+std::uint64_t add_environment(std::uint64_t hash, std::span<const T> q, std::span<const T> u,
+                              std::span<const T> impulse) {
+  std::vector<T> plain(impulse.begin(), impulse.end());
+  for (T& x : plain) x += 0;
+  return add<T>(add<T>(add<T>(hash, q), u), plain);
+}
+
+template <class T>
+std::uint64_t of_batch_as(const StaggeredTask& task, const World& world, Precision precision,
+                          const How& how) {
+  std::vector<Batch> batch;  // the one that runs
+  batch.emplace_back(world, how.options(precision));
+  const auto place = [&](int env) { return how.shuffled ? (7 * env + 3) % kEnvs : env; };
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (int step = 0; step < kSteps;) {
+    if (how.reloaded && step == kSteps / 2) {
+      const std::vector<std::uint8_t> saved = batch[0].save_state();
+      batch.clear();
+      batch.emplace_back(world, batch_options(kEnvs, precision));
+      batch[0].load_state(saved);
+    }
+    task.before(
+        step, [&](int env, const State& s) { reset(batch[0], place(env), s); },
+        [&](int env, const std::vector<double>& t) {
+          set_row(batch[0], BatchField::kPdTarget, place(env), t);
+        });
+    batch[0].step(StaggeredTask::kHold);
+    step += StaggeredTask::kHold;
+    if (step % kEvery == 0)
+      for (int env = 0; env < kEnvs; ++env)
+        hash = add_environment<T>(hash, row<T>(batch[0], BatchField::kQ, place(env)),
+                                  row<T>(batch[0], BatchField::kU, place(env)),
+                                  row<T>(batch[0], BatchField::kContactImpulse, place(env)));
+  }
+  return hash;
+}
+
+inline std::uint64_t of_batch(TaskKind kind, const ModelPtr& anymal, Integrator integrator,
+                              Precision precision, const How& how) {
+  const StaggeredTask task{kind, kEnvs};
+  const World world = task.make_world(anymal, integrator);
+  return precision == Precision::kFloat32 ? of_batch_as<float>(task, world, precision, how)
+                                          : of_batch_as<double>(task, world, precision, how);
+}
+
+/// What a float64 batch must give.
+inline std::uint64_t of_worlds(TaskKind kind, const ModelPtr& anymal, Integrator integrator) {
+  const StaggeredTask task{kind, kEnvs};
+  std::vector<World> worlds;
+  for (int env = 0; env < kEnvs; ++env) worlds.push_back(task.make_world(anymal, integrator));
+  const std::vector<ContactPoint> points =
+      Batch(worlds[0], batch_options(1, Precision::kFloat32)).contact_points();
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (int step = 0; step < kSteps;) {
+    task.before(
+        step, [&](int env, const State& s) { worlds[env].robot(0).set_state(s.q, s.u); },
+        [&](int env, const std::vector<double>& t) { worlds[env].robot(0).set_pd_target(t); });
+    for (World& world : worlds) world.step(StaggeredTask::kHold);
+    step += StaggeredTask::kHold;
+    for (int env = 0; env < kEnvs && step % kEvery == 0; ++env) {
+      const Robot& r = worlds[env].robot(0);
+      std::vector<double> impulse(3 * points.size());
+      for (const Contact& c : r.contacts())
+        for (size_t k = 0; k < points.size(); ++k)
+          if (points[k].shape == c.shape && points[k].point == c.point)
+            std::copy(c.impulse.begin(), c.impulse.end(), impulse.begin() + 3 * k);
+      hash = add_environment<double>(hash, r.q(), r.u(), impulse);
+    }
+  }
+  return hash;
+}
+
+inline std::string name(TaskKind kind, Integrator integrator, Precision precision) {
+  const StaggeredTask task{kind, kEnvs};
+  return state_hash::name((std::string("batch ") + task.spec().name).c_str(),
+                          options(task.time_step, integrator), kSteps) +
+         (precision == Precision::kFloat32 ? " float32" : " float64");
+}
+
+/// The float32 batches of golden.txt, by the pack that this machine takes.
+inline std::vector<state_hash::Entry> all(const ModelPtr& anymal) {
+  std::vector<state_hash::Entry> out;
+  for (const Integrator integrator : kBoth)
+    for (const TaskKind kind : kTasks)
+      out.push_back({name(kind, integrator, Precision::kFloat32),
+                     of_batch(kind, anymal, integrator, Precision::kFloat32, {})});
+  return out;
+}
+
+/// Every pack that was built and that this machine has, and for the narrowest of them other numbers
+/// of threads where there are `threads`.
+inline std::vector<How> ways(Precision precision, bool threads) {
+  std::vector<How> out;
+  for (const PackShape& shape : pack_shapes(precision)) {
+    out.push_back({shape.instruction_set, shape.width});
+    out.push_back({shape.instruction_set, shape.width, 2, true, true});
+  }
+  const How narrowest = *std::min_element(
+      out.begin(), out.end(), [](const How& a, const How& b) { return a.width < b.width; });
+  for (int n = 2; n <= 8 && threads; ++n)
+    out.push_back({narrowest.instruction_set, narrowest.width, n});
+  return out;
+}
+
+}  // namespace batch_hash
