@@ -81,6 +81,13 @@ inline bool same_environment(Batch& one, int a, Batch& two, int b) {
   return true;
 }
 
+inline bool all_same(Batch& one, Batch& two) {
+  bool same = one.num_envs() == two.num_envs();
+  for (int env = 0; env < one.num_envs() && same; ++env)
+    same = same_environment(one, env, two, env);
+  return same;
+}
+
 /// The packs of this machine.
 struct PackShape {
   std::string instruction_set;

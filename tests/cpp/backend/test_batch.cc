@@ -241,8 +241,8 @@ TEST(ManyStepsAtOnceAreStepsOneByOne) {
         CHECK(static_cast<std::uint32_t>(status(many, env)) == bits[env]);
         set_row(one, BatchField::kResidual, env, {&residual[env], 1});
         row<std::uint32_t>(one, BatchField::kStatus, env)[0] = bits[env];
-        CHECK(same_environment(many, env, one, env));
       }
+      CHECK(all_same(many, one));
     }
 }
 
@@ -515,7 +515,7 @@ TEST(ParametersMayBeChangedAndPutBackBetweenSteps) {
             BatchField::kBodyMass, BatchField::kBodyCom, BatchField::kBodyInertia})
         changed.array(f);
       plain.step(50), changed.step(50);
-      for (int env = 0; env < 9; ++env) CHECK(same_environment(plain, env, changed, env));
+      CHECK(all_same(plain, changed));
       const std::vector<std::uint8_t> saved = plain.save_state();
       set_inertials(changed, 4, inertials(3));
       changed.step(50), plain.step(50);
@@ -523,7 +523,7 @@ TEST(ParametersMayBeChangedAndPutBackBetweenSteps) {
         CHECK(same_environment(plain, env, changed, env) == (env != 4));
       set_inertials(changed, 4, inertials(0));
       for (Batch* b : {&plain, &changed}) b->load_state(saved), b->step(50);
-      for (int env = 0; env < 9; ++env) CHECK(same_environment(plain, env, changed, env));
+      CHECK(all_same(plain, changed));
     }
 }
 
@@ -593,7 +593,7 @@ TEST(AStateSavedByPacksOfOneWidthIsReadByAnother) {
         other.load_state(saved);
         CHECK(other.save_state() == saved);
         other.step(70);
-        for (int env = 0; env < 11; ++env) CHECK(same_environment(whole, env, other, env));
+        CHECK(all_same(whole, other));
       }
     }
 }
@@ -608,8 +608,8 @@ TEST(ResetPutsTheWorldsStateBackAndForgetsWhatWas) {
       const std::vector<std::int64_t> all{0, 1, 2, 3, 4, 5};
       used.reset(all, {}, {});
       fresh.reset(all, {}, {});
-      for (int env = 0; env < 6; ++env) CHECK(same_environment(used, env, fresh, env));
+      CHECK(all_same(used, fresh));
       used.step(140), fresh.step(140);
-      for (int env = 0; env < 6; ++env) CHECK(same_environment(used, env, fresh, env));
+      CHECK(all_same(used, fresh));
     }
 }

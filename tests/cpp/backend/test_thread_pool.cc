@@ -2,6 +2,8 @@
 #include <chrono>
 #ifdef __linux__
 #include <sched.h>
+#include <sys/wait.h>
+#include <unistd.h>
 #endif
 
 #include "backend/cpu/thread_pool.h"
@@ -140,3 +142,43 @@ TEST(PinningLeavesTheCallingThreadFree) {
   CHECK(CPU_EQUAL(&before, &after));
 #endif
 }
+
+#ifdef __linux__
+TEST(AForkedProcessDoesTheItemsWithItsOnlyThread) {
+  ThreadPool pool(3, false);
+  Tally tally(20);
+  pool.run(20, tally.work());
+  const pid_t child = fork();
+  if (child == 0) {
+    pool.run(20, tally.work());
+    _exit(tally.each(2) ? 0 : 1);
+  }
+  int status = -1;
+  waitpid(child, &status, 0);
+  CHECK(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+  pool.run(20, tally.work());
+  CHECK(tally.each(2));
+}
+#endif
+
+#ifdef __x86_64__
+TEST(EveryThreadRoundsToNearestAndKeepsSmallNumbersWhateverTheCallerDoes) {
+  struct Small {
+    std::atomic<int> kept{0};
+    static void call(void* self, int, long) {
+      volatile double tiny = 1e-308, ten = 10;
+      const bool nearest = 1 / ten == 0.1;  // above a tenth
+      static_cast<Small*>(self)->kept += tiny / 4 > 0 && nearest;
+    }
+  } small;
+  const unsigned before = __builtin_ia32_stmxcsr();
+  __builtin_ia32_ldmxcsr(0xffc0);  // flush to zero, round towards zero; new threads inherit it
+  ThreadPool pool(3, false), one(1, false);
+  pool.run(50, {Small::call, &small});
+  one.run(50, {Small::call, &small});
+  const bool left_as_it_was = __builtin_ia32_stmxcsr() >> 6 == 0xffc0u >> 6;
+  __builtin_ia32_ldmxcsr(before);
+  CHECK(small.kept == 100);
+  CHECK(left_as_it_was);
+}
+#endif
