@@ -31,9 +31,9 @@ STICKSLIP_INLINE Spatial<W> move_to_link(const LinkConstants<K>& c, bool prismat
 template <class W, class K>
 STICKSLIP_INLINE void place_inertia(const LinkInertia<K>& c, LinkState<W>& link) {
   const Mat3<W>& r = link.rotation;
-  store(inertia_at_reference(W(c.mass), madd(r, wide3<W>(c.com), link.position),
-                             rotate(r, sym3(c.inertia))),
-        link.inertia);
+  link.inertia.mass = W(c.mass);
+  store(madd(r, wide3<W>(c.com), link.position), link.inertia.com);
+  store(rotate(r, sym3(c.inertia)), link.inertia.rot);
 }
 
 /// (D6): velocity and acceleration of the parent become those of the link. Returns minus the
@@ -50,10 +50,8 @@ STICKSLIP_INLINE Spatial<W> bias_of_link(const LinkState<W>& link, W rate, Spati
 
 /// A wrench at the center of mass of a body as a force at the base origin.
 template <class W>
-STICKSLIP_INLINE Spatial<W> force_of_wrench(const Spatial<W>& wrench, const RigidInertia<W>& body) {
-  const auto heavy = body.mass > constant<W>(0);
-  const W inverse = constant<W>(1) / select(heavy, body.mass, constant<W>(1));
-  return {cross(body.h * inverse, wrench.lin, wrench.ang), wrench.lin};
+STICKSLIP_INLINE Spatial<W> force_of_wrench(const Spatial<W>& wrench, const BodyInertia<W>& body) {
+  return {cross(body.com, wrench.lin, wrench.ang), wrench.lin};
 }
 
 }  // namespace stickslip::dynamics::inline STICKSLIP_KERNELS

@@ -13,7 +13,7 @@ struct LinkState {
   Mat3<W> rotation;  // turned link frame -> world
   Vec3<W> position;  // of the link frame's origin [m]
   Spatial<W> axis;   // joint motion s: link velocity = parent's + s * rate
-  RigidInertia<W> inertia;
+  BodyInertia<W> inertia;
   Spatial<W> velocity;      // relative to the translation of the base origin
   Spatial<W> acceleration;  // of the last link of a chain that others hang on
   Spatial<W> force;         // applied to the link
@@ -29,7 +29,7 @@ struct LinkState {
 template <class S>
 struct BaseState {
   Mat3<S> rotation;
-  RigidInertia<S> inertia;
+  BodyInertia<S> inertia;
   Spatial<S> velocity;  // ang = angular velocity, lin = 0: the reference translates with the base
   Spatial<S> acceleration;
   Spatial<S> force;

@@ -45,10 +45,10 @@ STICKSLIP_INLINE void start_base(Tree<S>& t, const WalkInput<S>& in) {
   BaseState<S>& base = t.base;
   if constexpr (kParts & kPositions) base.rotation = rotation(in.quaternion);
   if constexpr (kParts & kInertias) {
-    base.inertia = inertia_at_reference(
-        t.base_mass, base.rotation * Vec3<S>{t.base_com[0], t.base_com[1], t.base_com[2]},
-        rotate(base.rotation, sym3(t.base_inertia)));
-    if constexpr (kParts & kComposite) base.composite = base.inertia;
+    base.inertia = {t.base_mass,
+                    base.rotation * Vec3<S>{t.base_com[0], t.base_com[1], t.base_com[2]},
+                    rotate(base.rotation, sym3(t.base_inertia))};
+    if constexpr (kParts & kComposite) base.composite = at_reference(base.inertia);
   }
   if constexpr (kParts & (kVelocities | kBias)) base.velocity = {in.angular_velocity, zero3<S>()};
   if constexpr (kParts & kBias) {
@@ -91,9 +91,9 @@ void chain_inertias(Tree<S>& t, const Bundle& b) {
 
 template <class S>
 void add_composite(Tree<S>& t, const Bundle& b) {
-  RigidInertia<Wide<S>> sum = t.links[b.first_slot].inertia;
+  RigidInertia<Wide<S>> sum = at_reference(t.links[b.first_slot].inertia);
   for (int slot = b.first_slot + 1; slot < b.first_slot + b.length; ++slot)
-    sum = sum + t.links[slot].inertia;
+    sum = sum + at_reference(t.links[slot].inertia);
   add_lanes<S, RigidInertia>(sum, b.lanes, t.base.composite);
 }
 
@@ -144,14 +144,15 @@ void chain_factor(Tree<S>& t, const Bundle& b, const S* diagonal) {
     constexpr int N = decltype(n)::value;
     const LinkState<W>& last = t.links[first + N - 1];
     if (b.has_children)
-      rest = factor_block<N>(t, first, last.from_children + last.inertia, diagonal);
+      rest = factor_block<N>(t, first, last.from_children + at_reference(last.inertia), diagonal);
     else
-      rest = factor_block<N>(t, first, last.inertia, diagonal);
+      rest = factor_block<N>(t, first, at_reference(last.inertia), diagonal);
   });
   while (slot > b.first_slot)
     next_block_inward(b, slot, [&](int first, auto n) STICKSLIP_LAMBDA {
       constexpr int N = decltype(n)::value;
-      rest = factor_block<N>(t, first, rest + t.links[first + N - 1].inertia, diagonal);
+      rest =
+          factor_block<N>(t, first, rest + at_reference(t.links[first + N - 1].inertia), diagonal);
     });
   add_to_parents<S, ArticulatedInertia>(t, b, rest, t.base.articulated,
                                         &LinkState<W>::from_children);
@@ -221,7 +222,8 @@ void walk(Tree<S>& t, const WalkInput<S>& in) {
       if (!kAtOnce || t.bundles[ib].has_children) walk_outward<kParts>(t, t.bundles[ib], in);
   if constexpr (kInward) {
     clear_sums<kParts>(t);
-    if constexpr (kParts & kFactor) store(articulated(t.base.inertia), t.base.articulated);
+    if constexpr (kParts & kFactor)
+      store(articulated(at_reference(t.base.inertia)), t.base.articulated);
     Spatial<S> on_base;
     if constexpr (kParts & kSolveTransposed) {
       if constexpr (kParts & kLinkForces)

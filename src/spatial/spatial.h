@@ -62,25 +62,33 @@ template <class S>
 STICKSLIP_INLINE RigidInertia<S> operator+(const RigidInertia<S>& a, const RigidInertia<S>& b) {
   return {a.mass + b.mass, a.h + b.h, a.rot + b.rot};
 }
-/// Force that gives a body with angular velocity w the angular acceleration a.ang, and its point at
-/// the reference the acceleration a.lin.
+/// Mass, center of mass c and rotational inertia about it.
 template <class S>
-STICKSLIP_INLINE Spatial<S> inertial_force(const RigidInertia<S>& i, const Vec3<S>& w,
-                                           const Spatial<S>& a) {
-  return {cross(w, i.rot * w, madd(i.rot, a.ang, cross(i.h, a.lin))),
-          cross(w, cross(w, i.h), cross(a.ang, i.h, a.lin * i.mass))};
-}
-/// Inertia of a body with mass m, center of mass c and inertia `about_com`, seen from the reference
-/// point.
+struct BodyInertia {
+  S mass;
+  Vec3<S> com;
+  Sym3<S> rot;
+};
+
+/// The same body seen from the reference point.
 template <class S>
-STICKSLIP_INLINE RigidInertia<S> inertia_at_reference(S m, const Vec3<S>& c,
-                                                      const Sym3<S>& about_com) {
-  const S hx = c.x * m, hy = c.y * m, hz = c.z * m;
+STICKSLIP_INLINE RigidInertia<S> at_reference(const BodyInertia<S>& i) {
+  const Vec3<S>& c = i.com;
+  const S hx = c.x * i.mass, hy = c.y * i.mass, hz = c.z * i.mass;
   const S xx = hx * c.x, yy = hy * c.y, zz = hz * c.z;
-  return {m,
+  return {i.mass,
           {hx, hy, hz},
-          {about_com.xx + (yy + zz), nmadd(hx, c.y, about_com.xy), nmadd(hx, c.z, about_com.xz),
-           about_com.yy + (xx + zz), nmadd(hy, c.z, about_com.yz), about_com.zz + (xx + yy)}};
+          {i.rot.xx + (yy + zz), nmadd(hx, c.y, i.rot.xy), nmadd(hx, c.z, i.rot.xz),
+           i.rot.yy + (xx + zz), nmadd(hy, c.z, i.rot.yz), i.rot.zz + (xx + yy)}};
+}
+/// Force that gives a body with angular velocity w the angular acceleration a.ang, and its point at
+/// the reference the acceleration a.lin. The moment uses the force as it was rounded, so that the
+/// error of a large centripetal force has no lever to a joint through the center of mass.
+template <class S>
+STICKSLIP_INLINE Spatial<S> inertial_force(const BodyInertia<S>& i, const Vec3<S>& w,
+                                           const Spatial<S>& a) {
+  const Vec3<S> f = cross(w, cross(w, i.com), cross(a.ang, i.com, a.lin)) * i.mass;
+  return {cross(w, i.rot * w, madd(i.rot, a.ang, cross(i.com, f))), f};
 }
 
 /// Articulated-body inertia: (moment; force) = [aa al; al^T ll] (angular; linear) [Featherstone

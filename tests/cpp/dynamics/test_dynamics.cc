@@ -272,6 +272,30 @@ TEST(FloatEqualsDoubleToFloatPrecision) {
   }
 }
 
+TEST(RotorsFeelNothingOfHowTheirCentripetalForceIsRounded) {
+  // A small disk spins fast about its center of mass, far from the base: no torque.
+  ModelBuilder builder("rotor");
+  const double mass = 0.1, disk = 1e-5, rate = 1000;
+  builder.add_link("base", Inertial{1, {0, 0, 0}, {1, 0, 0, 1, 0, 1}});
+  builder.add_link("disk", Inertial{mass, {0, 0, 0}, {disk, 0, 0, disk, 0, 2 * disk}});
+  LinkJoint joint;
+  joint.name = "spin", joint.parent = "base", joint.child = "disk";
+  joint.type = LinkJointType::kContinuous;
+  joint.axis = {0.48, 0.6, 0.64};
+  joint.pose.position = {1, -2, 0.5};
+  builder.add_joint(joint);
+  const ModelPtr model = builder.build(BaseType::kFloating);
+  TreeMemory<double> memory(*model);
+  Tree<double>& t = memory.tree();
+  const auto state = random_state(*model, 8);
+  compute_positions(t, state.data(), state.data() + 7);
+  compute_inertias(t);
+  compute_bias(t, zero3<double>(), &rate, zero3<double>());
+  double torque;
+  collect_joint_forces(t, &torque);
+  CHECK_NEAR(torque, 0, 1e-15 * disk * rate * rate * 10);  // not of mass * distance^2 * rate^2
+}
+
 TEST(FactorReproducesTheMassMatrix) {
   for (const ModelPtr& model : robots()) {
     TreeMemory<double> memory(*model);
