@@ -2,6 +2,10 @@
 // and packs of robots. Every lane is compared with the scalar, bit for bit; a difference makes the
 // program fail. The checksum tells whether two builds compute the same.
 //
+// Columns: passes alone; "all", those of a semi-implicit step one after the other, again and again
+// (their data leave the first-level cache in between); "semi", the same in one walk; "safe", what
+// an energy-safe step computes.
+//
 // Usage: bench_dynamics_kernels [anymal.urdf]
 #include <algorithm>
 #include <cstdint>
@@ -93,22 +97,32 @@ struct Robots {
   void forces() { solve_lower_transposed(t, tau.data(), LinkForces::kAll); }
   void multiply() { multiply_lower(t, v, rates.data()); }
   void solve() { solve_lower(t, base, out.data()); }
-  void fused() {
+  void separate() { positions(), inertias(), bias(), factor(), forces(), solve(); }
+  /// The same in one walk, as a semi-implicit step does it.
+  void semi_implicit() {
     WalkInput<S> in;
-    in.quaternion = quaternion, in.joints = q.data(), in.angular_velocity = w,
-    in.rates = rates.data();
-    in.gravity = gravity, in.diagonal = diagonal.data(), in.tau = tau.data(),
-    in.base_force = nullptr;
+    in.quaternion = quaternion, in.joints = q.data();
+    in.angular_velocity = w, in.rates = rates.data(), in.gravity = gravity;
+    in.diagonal = diagonal.data(), in.tau = tau.data();
     compute_free_motion(t, in), solve();
   }
-  void separate() { positions(), inertias(), bias(), factor(), forces(), solve(); }
+  /// What an energy-safe step does when nothing turns fast and nothing touches.
+  void energy_safe() {
+    multiply_lower(t, w, v, rates.data());
+    solve_bias(t, w, rates.data(), gravity), solve();
+    positions();
+    factor_and_solve_bias(t, diagonal.data(), w, rates.data(), gravity), solve();
+    multiply_lower(t, w, v, rates.data());
+  }
 
-  /// Everything a step reads afterwards.
-  std::vector<S> results() const {
-    std::vector<S> r(out);
-    r.insert(r.end(), base, base + 6);
-    for (int slot = 0; slot < t.num_slots; ++slot)
-      for (int lane = 0; lane < t.bundles[0].lanes; ++lane) r.push_back(squared_norm(t));
+  /// What steps hand on, after each of the two.
+  std::vector<S> results() {
+    std::vector<S> r;
+    semi_implicit();
+    r.insert(r.end(), base, base + 6), r.insert(r.end(), out.begin(), out.end());
+    energy_safe();
+    r.insert(r.end(), base, base + 6), r.insert(r.end(), out.begin(), out.end());
+    r.push_back(squared_norm(t));
     return r;
   }
 };
@@ -120,11 +134,9 @@ std::uint64_t checksum = 14695981039346656037ull;
 template <class S>
 void compare(const Model& model) {
   Robots<S> packed(model, 0);
-  packed.separate();
   const auto lanes = packed.results();
   for (int lane = 0; lane < ScalarTraits<S>::kWidth; ++lane) {
     Robots<Value<S>> one(model, lane);
-    one.separate();
     const auto scalar = one.results();
     for (size_t k = 0; k < scalar.size(); ++k) {
       const Value<S> x = get_lane(lanes[k], lane);
@@ -139,7 +151,7 @@ template <class S>
 void time_scalar(const char* name, const Model& model) {
   compare<S>(model);
   Robots<S> r(model, 0);
-  r.separate();
+  r.semi_implicit();
   const int calls = 40000 / model.num_joints() / ScalarTraits<S>::kWidth + 100;
   std::printf("  %-10s", name);
   const auto time = [&](auto pass) {
@@ -155,20 +167,30 @@ void time_scalar(const char* name, const Model& model) {
   time([&] { r.multiply(); });
   time([&] { r.solve(); });
   time([&] { r.separate(); });
-  time([&] { r.fused(); });
+  time([&] { r.semi_implicit(); });
+  time([&] { r.energy_safe(); });
   std::printf("\n");
 }
 
 void time_robot(const char* name, const Model& model) {
   std::printf("%s, %d joints: nanoseconds per robot\n  %-10s", name, model.num_joints(), "scalar");
   for (const char* pass : {"position", "inertia", "velocity", "bias", "factor", "L^-T f", "L u",
-                           "L^-1 x", "all", "fused"})
+                           "L^-1 x", "all", "semi", "safe"})
     std::printf(" %8s", pass);
   std::printf("\n");
   time_scalar<double>("double", model);
+#if defined(__AVX512F__)
   time_scalar<Pack<double, 8>>("double x8", model);
-  time_scalar<Pack<float, 8>>("float x8", model);
   time_scalar<Pack<float, 16>>("float x16", model);
+#elif defined(__AVX2__)
+  time_scalar<Pack<double, 4>>("double x4", model);
+#endif
+#if defined(__AVX2__)
+  time_scalar<Pack<float, 8>>("float x8", model);
+#else
+  time_scalar<Pack<double, 2>>("double x2", model);
+  time_scalar<Pack<float, 4>>("float x4", model);
+#endif
 }
 
 }  // namespace

@@ -72,13 +72,13 @@ STICKSLIP_INLINE ArticulatedInertia<Wide<S>> factor_block(Tree<S>& t, int slot, 
     const Spatial<W> s1 = link[1].axis, s2 = link[2].axis;
     u2 = inertia * s2;
     m22 = dot(u2, s2), m21 = dot(u2, s1), m20 = dot(u2, s0);
-    inertia = inertia + link[1].inertia;
+    inertia = inertia + at_reference(link[1].inertia);
   }
   if constexpr (N > 1) {
     const Spatial<W> s1 = link[1].axis;
     u1 = inertia * s1;
     m11 = dot(u1, s1), m10 = dot(u1, s0);
-    inertia = inertia + link[0].inertia;
+    inertia = inertia + at_reference(link[0].inertia);
   }
   u0 = inertia * s0;
   m00 = dot(u0, s0);

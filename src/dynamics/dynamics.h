@@ -20,7 +20,6 @@ void solve_bias(Tree<S>& t, const Vec3<S>& angular_velocity, const S* rates,
                 const Vec3<S>& gravity) {
   WalkInput<S> in;
   in.angular_velocity = angular_velocity, in.rates = rates, in.gravity = gravity;
-  in.tau = nullptr, in.base_force = nullptr;
   walk<kBias | kSolveTransposed | kLinkForces>(t, in);
 }
 
@@ -30,7 +29,7 @@ void factor_and_solve_bias(Tree<S>& t, const S* diagonal, const Vec3<S>& angular
                            const S* rates, const Vec3<S>& gravity) {
   WalkInput<S> in;
   in.angular_velocity = angular_velocity, in.rates = rates, in.gravity = gravity;
-  in.diagonal = diagonal, in.tau = nullptr, in.base_force = nullptr;
+  in.diagonal = diagonal;
   walk<kInertias | kComposite | kBias | kFactor | kSolveTransposed | kLinkForces>(t, in);
 }
 

@@ -20,14 +20,6 @@ void compute_inertias(Tree<S>& t) {
   walk<kInertias | kComposite>(t, WalkInput<S>{});
 }
 
-/// compute_positions, then compute_inertias.
-template <class S>
-void compute_positions_and_inertias(Tree<S>& t, const S quaternion[4], const S* joints) {
-  WalkInput<S> in;
-  in.quaternion = quaternion, in.joints = joints;
-  walk<kPositions | kInertias | kComposite>(t, in);
-}
-
 /// Link velocities relative to the translation of the base origin.
 template <class S>
 void compute_velocities(Tree<S>& t, const Vec3<S>& angular_velocity, const S* rates) {

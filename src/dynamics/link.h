@@ -31,30 +31,27 @@ STICKSLIP_INLINE Spatial<W> move_to_link(const LinkConstants<K>& c, bool prismat
 template <class W, class K>
 STICKSLIP_INLINE void place_inertia(const LinkInertia<K>& c, LinkState<W>& link) {
   const Mat3<W>& r = link.rotation;
-  store(inertia_at_reference(W(c.mass), madd(r, wide3<W>(c.com), link.position),
-                             rotate(r, wide_sym3<W>(c.inertia))),
-        link.inertia);
+  link.inertia.mass = W(c.mass);
+  store(madd(r, wide3<W>(c.com), link.position), link.inertia.com);
+  store(rotate(r, sym3(c.inertia)), link.inertia.rot);
 }
 
-/// (D6): velocity, acceleration and A of the parent become those of the link. Returns minus the
+/// (D6): velocity and acceleration of the parent become those of the link. Returns minus the
 /// inertial force.
 template <class W>
-STICKSLIP_INLINE Spatial<W> bias_of_link(const LinkState<W>& link, bool prismatic, W rate,
-                                         Spatial<W>& v, Spatial<W>& a, Mat3<W>& field) {
-  const Vec3<W> turn = link.axis.ang * rate;
-  v = {v.ang + turn, madd(link.axis.lin, rate, v.lin)};
-  a.ang = cross(v.ang, turn, a.ang);
-  change_field(v.ang, a.ang, link.position, field, a.lin);
-  if (prismatic) a.lin = cross(v.ang, link.axis.lin * (rate + rate), a.lin);
-  return -inertial_force(link.inertia, v.ang, a, field);
+STICKSLIP_INLINE Spatial<W> bias_of_link(const LinkState<W>& link, W rate, Spatial<W>& v,
+                                         Spatial<W>& a) {
+  const Spatial<W> joint = link.axis * rate, parent = v;
+  v = v + joint;
+  a.ang = cross(v.ang, joint.ang, a.ang);
+  a.lin = cross(v.ang + parent.ang, joint.lin, a.lin);
+  return -inertial_force(link.inertia, v.ang, a);
 }
 
 /// A wrench at the center of mass of a body as a force at the base origin.
 template <class W>
-STICKSLIP_INLINE Spatial<W> force_of_wrench(const Spatial<W>& wrench, const RigidInertia<W>& body) {
-  const auto heavy = body.mass > constant<W>(0);
-  const W inverse = constant<W>(1) / select(heavy, body.mass, constant<W>(1));
-  return {cross(body.h * inverse, wrench.lin, wrench.ang), wrench.lin};
+STICKSLIP_INLINE Spatial<W> force_of_wrench(const Spatial<W>& wrench, const BodyInertia<W>& body) {
+  return {cross(body.com, wrench.lin, wrench.ang), wrench.lin};
 }
 
 }  // namespace stickslip::dynamics::inline STICKSLIP_KERNELS

@@ -11,7 +11,8 @@ template <class S>
 void compute_mass_matrix(const Tree<S>& t, RigidInertia<Wide<S>>* composites, S* out) {
   const int offset = t.floating ? 6 : 0, n = t.num_joints + offset;
   for (int i = 0; i < n * n; ++i) out[i] = constant<S>(0);
-  for (int slot = 0; slot < t.num_slots; ++slot) composites[slot] = t.links[slot].inertia;
+  for (int slot = 0; slot < t.num_slots; ++slot)
+    composites[slot] = at_reference(t.links[slot].inertia);
   const auto put = [&](int i, int j, S value) { out[i * n + j] = out[j * n + i] = value; };
   const auto composite_of = [&](LinkIndex link) {
     const auto* from = reinterpret_cast<const Wide<S>*>(&composites[link.slot]);

@@ -15,7 +15,6 @@ template <class S>
 void solve_lower_transposed(Tree<S>& t, const S* tau, LinkForces forces) {
   WalkInput<S> in;
   in.tau = tau;
-  in.base_force = nullptr;
   if (forces == LinkForces::kAll)
     walk<kSolveTransposed | kLinkForces>(t, in);
   else

@@ -13,7 +13,7 @@ struct LinkState {
   Mat3<W> rotation;  // turned link frame -> world
   Vec3<W> position;  // of the link frame's origin [m]
   Spatial<W> axis;   // joint motion s: link velocity = parent's + s * rate
-  RigidInertia<W> inertia;
+  BodyInertia<W> inertia;
   Spatial<W> velocity;      // relative to the translation of the base origin
   Spatial<W> acceleration;  // of the last link of a chain that others hang on
   Spatial<W> force;         // applied to the link
@@ -29,7 +29,7 @@ struct LinkState {
 template <class S>
 struct BaseState {
   Mat3<S> rotation;
-  RigidInertia<S> inertia;
+  BodyInertia<S> inertia;
   Spatial<S> velocity;  // ang = angular velocity, lin = 0: the reference translates with the base
   Spatial<S> acceleration;
   Spatial<S> force;
@@ -177,9 +177,9 @@ template <class W, class K>
 STICKSLIP_INLINE Vec3<W> wide3(const K v[3]) {
   return {W(v[0]), W(v[1]), W(v[2])};
 }
-template <class W, class K>
-STICKSLIP_INLINE Sym3<W> wide_sym3(const K v[6]) {
-  return {W(v[0]), W(v[1]), W(v[2]), W(v[3]), W(v[4]), W(v[5])};
+template <class K>
+STICKSLIP_INLINE Sym3<K> sym3(const K v[6]) {
+  return {v[0], v[1], v[2], v[3], v[4], v[5]};
 }
 template <class W, class K>
 STICKSLIP_INLINE Mat3<W> wide_mat3(const K v[9]) {

@@ -33,16 +33,6 @@ struct TreeLayout {
   LinkInertia<double> turned_inertia(int body, const Inertial& inertial) const;
 };
 
-/// Puts the mass properties of one lane (environment or branch) into `to`, which a tree's
-/// `inertias` may point to.
-template <class W>
-void set_inertia(LinkInertia<W>& to, int lane, const LinkInertia<double>& from) {
-  const auto set = [&](W& x, double value) { set_lane(x, lane, static_cast<Value<W>>(value)); };
-  set(to.mass, from.mass);
-  for (int k = 0; k < 3; ++k) set(to.com[k], from.com[k]);
-  for (int k = 0; k < 6; ++k) set(to.inertia[k], from.inertia[k]);
-}
-
 /// Packs the constants of a layout for the scalar S.
 template <class S>
 std::vector<LinkConstants<WideConstant<S>>> pack_constants(const TreeLayout& layout) {

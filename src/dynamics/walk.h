@@ -26,18 +26,18 @@ enum Part : unsigned {
 /// What a walk reads besides the tree; what none of its parts needs may stay unset.
 template <class S>
 struct WalkInput {
-  const S* quaternion;           // w x y z
-  const S* joints;               // (num_joints)
-  Vec3<S> angular_velocity;      // of the base
-  Vec3<S> linear_velocity;       // of the base; only x = L u depends on it
-  const S* rates;                // (num_joints)
-  Vec3<S> gravity;               // [m/s^2]
-  const S* diagonal;             // (num_joints) or null
-  const S* tau;                  // (num_joints) or null
-  const Spatial<S>* base_force;  // on body 0, besides its bias force; or null
+  const S* quaternion;                     // w x y z
+  const S* joints;                         // (num_joints)
+  Vec3<S> angular_velocity;                // of the base
+  Vec3<S> linear_velocity;                 // of the base; only x = L u depends on it
+  const S* rates;                          // (num_joints)
+  Vec3<S> gravity;                         // [m/s^2]
+  const S* diagonal = nullptr;             // (num_joints); null: zero
+  const S* tau = nullptr;                  // (num_joints); null: zero
+  const Spatial<S>* base_force = nullptr;  // on body 0, besides its bias force
   // At the centers of mass, world axes: of body 0 and per slot; both or none.
-  const Spatial<S>* base_wrench;
-  const Spatial<Wide<S>>* wrenches;
+  const Spatial<S>* base_wrench = nullptr;
+  const Spatial<Wide<S>>* wrenches = nullptr;
 };
 
 template <unsigned kParts, class S>
@@ -45,16 +45,15 @@ STICKSLIP_INLINE void start_base(Tree<S>& t, const WalkInput<S>& in) {
   BaseState<S>& base = t.base;
   if constexpr (kParts & kPositions) base.rotation = rotation(in.quaternion);
   if constexpr (kParts & kInertias) {
-    base.inertia = inertia_at_reference(
-        t.base_mass, base.rotation * Vec3<S>{t.base_com[0], t.base_com[1], t.base_com[2]},
-        rotate(base.rotation, wide_sym3<S>(t.base_inertia)));
-    if constexpr (kParts & kComposite) base.composite = base.inertia;
+    base.inertia = {t.base_mass,
+                    base.rotation * Vec3<S>{t.base_com[0], t.base_com[1], t.base_com[2]},
+                    rotate(base.rotation, sym3(t.base_inertia))};
+    if constexpr (kParts & kComposite) base.composite = at_reference(base.inertia);
   }
   if constexpr (kParts & (kVelocities | kBias)) base.velocity = {in.angular_velocity, zero3<S>()};
   if constexpr (kParts & kBias) {
     base.acceleration = {zero3<S>(), -in.gravity};
-    base.force = -inertial_force(base.inertia, in.angular_velocity, base.acceleration,
-                                 acceleration_field(in.angular_velocity, zero3<S>()));
+    base.force = -inertial_force(base.inertia, in.angular_velocity, base.acceleration);
   }
   if constexpr (kParts & kLinkForces)
     if (in.base_force) base.force = base.force + *in.base_force;
@@ -92,9 +91,9 @@ void chain_inertias(Tree<S>& t, const Bundle& b) {
 
 template <class S>
 void add_composite(Tree<S>& t, const Bundle& b) {
-  RigidInertia<Wide<S>> sum = t.links[b.first_slot].inertia;
+  RigidInertia<Wide<S>> sum = at_reference(t.links[b.first_slot].inertia);
   for (int slot = b.first_slot + 1; slot < b.first_slot + b.length; ++slot)
-    sum = sum + t.links[slot].inertia;
+    sum = sum + at_reference(t.links[slot].inertia);
   add_lanes<S, RigidInertia>(sum, b.lanes, t.base.composite);
 }
 
@@ -113,12 +112,10 @@ void chain_bias(Tree<S>& t, const Bundle& b, const S* rates) {
   using W = Wide<S>;
   Spatial<W> v = from_parents<S, Spatial>(t, b, t.base.velocity, &LinkState<W>::velocity);
   Spatial<W> a = from_parents<S, Spatial>(t, b, t.base.acceleration, &LinkState<W>::acceleration);
-  Mat3<W> field = acceleration_field(v.ang, a.ang);
   const int last = b.first_slot + b.length - 1;
   for (int slot = b.first_slot; slot <= last; ++slot) {
     LinkState<W>& link = t.links[slot];
-    const Slot& s = t.slots[slot];
-    store(bias_of_link(link, s.prismatic, load_lanes(rates, s.joint), v, a, field), link.force);
+    store(bias_of_link(link, load_lanes(rates, t.slots[slot].joint), v, a), link.force);
     store(v, link.velocity);
     if (slot == last && b.has_children) store(a, link.acceleration);
   }
@@ -147,14 +144,15 @@ void chain_factor(Tree<S>& t, const Bundle& b, const S* diagonal) {
     constexpr int N = decltype(n)::value;
     const LinkState<W>& last = t.links[first + N - 1];
     if (b.has_children)
-      rest = factor_block<N>(t, first, last.from_children + last.inertia, diagonal);
+      rest = factor_block<N>(t, first, last.from_children + at_reference(last.inertia), diagonal);
     else
-      rest = factor_block<N>(t, first, last.inertia, diagonal);
+      rest = factor_block<N>(t, first, at_reference(last.inertia), diagonal);
   });
   while (slot > b.first_slot)
     next_block_inward(b, slot, [&](int first, auto n) STICKSLIP_LAMBDA {
       constexpr int N = decltype(n)::value;
-      rest = factor_block<N>(t, first, rest + t.links[first + N - 1].inertia, diagonal);
+      rest =
+          factor_block<N>(t, first, rest + at_reference(t.links[first + N - 1].inertia), diagonal);
     });
   add_to_parents<S, ArticulatedInertia>(t, b, rest, t.base.articulated,
                                         &LinkState<W>::from_children);
@@ -224,7 +222,8 @@ void walk(Tree<S>& t, const WalkInput<S>& in) {
       if (!kAtOnce || t.bundles[ib].has_children) walk_outward<kParts>(t, t.bundles[ib], in);
   if constexpr (kInward) {
     clear_sums<kParts>(t);
-    if constexpr (kParts & kFactor) store(articulated(t.base.inertia), t.base.articulated);
+    if constexpr (kParts & kFactor)
+      store(articulated(at_reference(t.base.inertia)), t.base.articulated);
     Spatial<S> on_base;
     if constexpr (kParts & kSolveTransposed) {
       if constexpr (kParts & kLinkForces)

@@ -62,53 +62,33 @@ template <class S>
 STICKSLIP_INLINE RigidInertia<S> operator+(const RigidInertia<S>& a, const RigidInertia<S>& b) {
   return {a.mass + b.mass, a.h + b.h, a.rot + b.rot};
 }
-/// A with A r + a the acceleration of the point r of a body, a that of its point at the reference:
-/// [alpha]x + w w^T - |w|^2.
+/// Mass, center of mass c and rotational inertia about it.
 template <class S>
-STICKSLIP_INLINE Mat3<S> acceleration_field(const Vec3<S>& w, const Vec3<S>& alpha) {
-  const S yy = w.y * w.y, zz = w.z * w.z;
-  return {{nmadd(w.y, w.y, -zz), madd(w.x, w.y, -alpha.z), madd(w.x, w.z, alpha.y),
-           madd(w.x, w.y, alpha.z), nmadd(w.x, w.x, -zz), madd(w.y, w.z, -alpha.x),
-           madd(w.x, w.z, -alpha.y), madd(w.y, w.z, alpha.x), nmadd(w.x, w.x, -yy)}};
-}
-/// `field` becomes the acceleration_field of another body that shares its acceleration at the point
-/// p; so `a`, at the reference, becomes that body's. Row by row: nine numbers less to hold.
+struct BodyInertia {
+  S mass;
+  Vec3<S> com;
+  Sym3<S> rot;
+};
+
+/// The same body seen from the reference point.
 template <class S>
-STICKSLIP_INLINE void change_field(const Vec3<S>& w, const Vec3<S>& alpha, const Vec3<S>& p,
-                                   Mat3<S>& field, Vec3<S>& a) {
-  const S yy = w.y * w.y, zz = w.z * w.z;
-  const auto change_row = [&](S& x, S& y, S& z, const Vec3<S>& row,
-                              S& sum) __attribute__((always_inline)) {
-    sum = madd(z - row.z, p.z, madd(y - row.y, p.y, madd(x - row.x, p.x, sum)));
-    x = row.x, y = row.y, z = row.z;
-  };
-  S* m = field.m;
-  change_row(m[0], m[1], m[2],
-             {nmadd(w.y, w.y, -zz), madd(w.x, w.y, -alpha.z), madd(w.x, w.z, alpha.y)}, a.x);
-  change_row(m[3], m[4], m[5],
-             {madd(w.x, w.y, alpha.z), nmadd(w.x, w.x, -zz), madd(w.y, w.z, -alpha.x)}, a.y);
-  change_row(m[6], m[7], m[8],
-             {madd(w.x, w.z, -alpha.y), madd(w.y, w.z, alpha.x), nmadd(w.x, w.x, -yy)}, a.z);
-}
-/// Force that gives a body with angular velocity w the angular acceleration a.ang, its point at the
-/// reference the acceleration a.lin; `field` is the acceleration_field.
-template <class S>
-STICKSLIP_INLINE Spatial<S> inertial_force(const RigidInertia<S>& i, const Vec3<S>& w,
-                                           const Spatial<S>& a, const Mat3<S>& field) {
-  return {cross(w, i.rot * w, madd(i.rot, a.ang, cross(i.h, a.lin))),
-          madd(field, i.h, a.lin * i.mass)};
-}
-/// Inertia of a body with mass m, center of mass c and inertia `about_com`, seen from the reference
-/// point.
-template <class S>
-STICKSLIP_INLINE RigidInertia<S> inertia_at_reference(S m, const Vec3<S>& c,
-                                                      const Sym3<S>& about_com) {
-  const S hx = c.x * m, hy = c.y * m, hz = c.z * m;
+STICKSLIP_INLINE RigidInertia<S> at_reference(const BodyInertia<S>& i) {
+  const Vec3<S>& c = i.com;
+  const S hx = c.x * i.mass, hy = c.y * i.mass, hz = c.z * i.mass;
   const S xx = hx * c.x, yy = hy * c.y, zz = hz * c.z;
-  return {m,
+  return {i.mass,
           {hx, hy, hz},
-          {about_com.xx + (yy + zz), nmadd(hx, c.y, about_com.xy), nmadd(hx, c.z, about_com.xz),
-           about_com.yy + (xx + zz), nmadd(hy, c.z, about_com.yz), about_com.zz + (xx + yy)}};
+          {i.rot.xx + (yy + zz), nmadd(hx, c.y, i.rot.xy), nmadd(hx, c.z, i.rot.xz),
+           i.rot.yy + (xx + zz), nmadd(hy, c.z, i.rot.yz), i.rot.zz + (xx + yy)}};
+}
+/// Force that gives a body with angular velocity w the angular acceleration a.ang, and its point at
+/// the reference the acceleration a.lin. The moment uses the force as it was rounded, so that the
+/// error of a large centripetal force has no lever to a joint through the center of mass.
+template <class S>
+STICKSLIP_INLINE Spatial<S> inertial_force(const BodyInertia<S>& i, const Vec3<S>& w,
+                                           const Spatial<S>& a) {
+  const Vec3<S> f = cross(w, cross(w, i.com), cross(a.ang, i.com, a.lin)) * i.mass;
+  return {cross(w, i.rot * w, madd(i.rot, a.ang, cross(i.com, f))), f};
 }
 
 /// Articulated-body inertia: (moment; force) = [aa al; al^T ll] (angular; linear) [Featherstone

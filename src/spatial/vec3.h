@@ -67,12 +67,6 @@ struct Mat3 {
 };
 
 template <class S>
-STICKSLIP_INLINE Mat3<S> operator-(const Mat3<S>& a, const Mat3<S>& b) {
-  const S *x = a.m, *y = b.m;
-  return {{x[0] - y[0], x[1] - y[1], x[2] - y[2], x[3] - y[3], x[4] - y[4], x[5] - y[5],
-           x[6] - y[6], x[7] - y[7], x[8] - y[8]}};
-}
-template <class S>
 STICKSLIP_INLINE Vec3<S> operator*(const Mat3<S>& a, const Vec3<S>& b) {
   const S* m = a.m;
   return {madd(m[2], b.z, madd(m[1], b.y, m[0] * b.x)),
@@ -140,17 +134,27 @@ STICKSLIP_INLINE Vec3<S> madd(const Sym3<S>& a, const Vec3<S>& b, const Vec3<S>&
           madd(a.yz, b.z, madd(a.yy, b.y, madd(a.xy, b.x, c.y))),
           madd(a.zz, b.z, madd(a.yz, b.y, madd(a.xz, b.x, c.z)))};
 }
-/// R A R^T
-template <class S>
-STICKSLIP_INLINE Sym3<S> rotate(const Mat3<S>& r, const Sym3<S>& a) {
-  const Mat3<S> t = r * Mat3<S>{{a.xx, a.xy, a.xz, a.xy, a.yy, a.yz, a.xz, a.yz, a.zz}};
-  const S *x = t.m, *y = r.m;
-  return {madd(x[2], y[2], madd(x[1], y[1], x[0] * y[0])),
-          madd(x[2], y[5], madd(x[1], y[4], x[0] * y[3])),
-          madd(x[2], y[8], madd(x[1], y[7], x[0] * y[6])),
-          madd(x[5], y[5], madd(x[4], y[4], x[3] * y[3])),
-          madd(x[5], y[8], madd(x[4], y[7], x[3] * y[6])),
-          madd(x[8], y[8], madd(x[7], y[7], x[6] * y[6]))};
+/// R A R^T for a rotation R: A = zz 1 + B with B_zz = 0, and the trace stays.
+template <class S, class K>
+STICKSLIP_INLINE Sym3<S> rotate(const Mat3<S>& r, const Sym3<K>& a) {
+  const S xx(a.xx - a.zz), yy(a.yy - a.zz), xy(a.xy), xz(a.xz), yz(a.yz), zz(a.zz);
+  const S* m = r.m;
+  // B's columns, turned
+  const Vec3<S> x{madd(m[2], xz, madd(m[1], xy, m[0] * xx)),
+                  madd(m[5], xz, madd(m[4], xy, m[3] * xx)),
+                  madd(m[8], xz, madd(m[7], xy, m[6] * xx))};
+  const Vec3<S> y{madd(m[2], yz, madd(m[1], yy, m[0] * xy)),
+                  madd(m[5], yz, madd(m[4], yy, m[3] * xy)),
+                  madd(m[8], yz, madd(m[7], yy, m[6] * xy))};
+  const Vec3<S> z{madd(m[1], yz, m[0] * xz), madd(m[4], yz, m[3] * xz), madd(m[7], yz, m[6] * xz)};
+  const S first = madd(z.x, m[2], madd(y.x, m[1], madd(x.x, m[0], zz)));
+  const S second = madd(z.y, m[5], madd(y.y, m[4], madd(x.y, m[3], zz)));
+  return {first,
+          madd(z.x, m[5], madd(y.x, m[4], x.x * m[3])),
+          madd(z.x, m[8], madd(y.x, m[7], x.x * m[6])),
+          second,
+          madd(z.y, m[8], madd(y.y, m[7], x.y * m[6])),
+          (S(a.xx + a.yy + a.zz) - first) - second};
 }
 
 /// Rotation matrix of the unit quaternion w x y z.
