@@ -25,11 +25,13 @@ HOST_HEADERS = {
     "contact/method_of.h",
     "dynamics/tree_layout.h",
     "dynamics/tree_memory.h",
+    "step/aligned_block.h",
     "step/host_solver.h",
     "step/robot_data.h",
     "step/robot_impl.h",
     "step/robot_scene.h",
     "step/snapshot.h",
+    "step/state_check.h",
     "step/world_impl.h",
 }
 # Where a library's linear algebra serves: systems beyond robot size, which no step solves.

@@ -94,7 +94,7 @@ struct Robots {
   void velocities() { compute_velocities(t, w, rates.data()); }
   void bias() { compute_bias(t, w, rates.data(), gravity); }
   void factor() { factor_mass_matrix(t, diagonal.data()); }
-  void forces() { solve_lower_transposed(t, tau.data(), LinkForces::kAll); }
+  void forces() { solve_lower_transposed(t, tau.data()); }
   void multiply() { multiply_lower(t, v, rates.data()); }
   void solve() { solve_lower(t, base, out.data()); }
   void separate() { positions(), inertias(), bias(), factor(), forces(), solve(); }

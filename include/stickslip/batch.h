@@ -41,7 +41,7 @@ enum class BatchField {
   kContactImpulse,    ///< T (points, 3) on the robot, world axes [N s], of the last substep
   kContactActive,     ///< uint8 (points): it was in the solve of the last substep
   kStatus,            ///< uint32 (): StepStatus bits of the last `step`, or-ed over its steps
-  kResidual,          ///< T (): largest contact residual of the last `step` [m/s]
+  kResidual,          ///< T (): largest contact residual of the last `step` [m/s], see StepInfo
   kTime,              ///< double (): since the last reset [s]
   // Parameters. Shared by all environments until one is asked for: only then each gets its own.
   kKp,           ///< T (joints), >= 0

@@ -92,7 +92,8 @@ struct StepInfo {
   int sweeps = 0;        ///< passes over all contacts
   int newton_steps = 0;  ///< of the solver's finish and fallback; kAuto only
   int substeps = 1;      ///< kEnergySafe: parts the step was cut into
-  double residual = 0;   ///< largest contact residual [m/s]
+  double residual = 0;   ///< largest contact residual [m/s]; infinite where a problem was refused
+                         ///< because it is not finite
 };
 
 /// Seconds spent per stage since the last reset; only counted while `World::set_profiling(true)`.

@@ -109,14 +109,14 @@ STICKSLIP_INLINE ArticulatedInertia<Wide<S>> factor_block(Tree<S>& t, int slot, 
 
 /// x of the N joints at `slot` from the force f on the last one's link and all that hangs on it,
 /// its own apart (D11). f becomes what is passed on.
-template <int N, bool kLinkForces, class S>
+template <int N, class S>
 STICKSLIP_INLINE void solve_transposed_block(Tree<S>& t, int slot, const S* tau,
                                              Spatial<Wide<S>>& f) {
   using W = Wide<S>;
   LinkState<W>* link = t.links + slot;
   W x0, x1, x2;
   const auto on_joint = [&](int k) STICKSLIP_LAMBDA {
-    if constexpr (kLinkForces) f = f + link[k].force;
+    f = f + link[k].force;
     const W along = dot(f, link[k].axis);
     return tau ? along + load_lanes(tau, t.slots[slot + k].joint) : along;
   };

@@ -10,8 +10,7 @@ namespace stickslip::dynamics::inline STICKSLIP_KERNELS {
 /// velocity.
 template <class S>
 void compute_free_motion(Tree<S>& t, const WalkInput<S>& in) {
-  walk<kPositions | kInertias | kBias | kFactor | kSolveTransposed | kLinkForces | kWrenches>(t,
-                                                                                              in);
+  walk<kPositions | kInertias | kBias | kFactor | kSolveTransposed | kWrenches>(t, in);
 }
 
 /// x = L^-T (-h) with the factor of these positions: compute_bias, then solve_lower_transposed.
@@ -20,7 +19,7 @@ void solve_bias(Tree<S>& t, const Vec3<S>& angular_velocity, const S* rates,
                 const Vec3<S>& gravity) {
   WalkInput<S> in;
   in.angular_velocity = angular_velocity, in.rates = rates, in.gravity = gravity;
-  walk<kBias | kSolveTransposed | kLinkForces>(t, in);
+  walk<kBias | kSolveTransposed>(t, in);
 }
 
 /// solve_bias at new positions: compute_inertias and factor_mass_matrix before it.
@@ -30,7 +29,7 @@ void factor_and_solve_bias(Tree<S>& t, const S* diagonal, const Vec3<S>& angular
   WalkInput<S> in;
   in.angular_velocity = angular_velocity, in.rates = rates, in.gravity = gravity;
   in.diagonal = diagonal;
-  walk<kInertias | kComposite | kBias | kFactor | kSolveTransposed | kLinkForces>(t, in);
+  walk<kInertias | kComposite | kBias | kFactor | kSolveTransposed>(t, in);
 }
 
 }  // namespace stickslip::dynamics::inline STICKSLIP_KERNELS

@@ -6,19 +6,13 @@
 
 namespace stickslip::dynamics::inline STICKSLIP_KERNELS {
 
-/// Which forces besides the joint forces act in `solve_lower_transposed`.
-enum class LinkForces { kNone, kAll };
-
-/// x = L^-T (tau + forces on links), into links[].x and base.x. `tau` (num_joints) may be null;
-/// `forces` says whether base.force and links[].force take part.
+/// x = L^-T (tau + base.force + links[].force), into links[].x and base.x. `tau` (num_joints) may
+/// be null.
 template <class S>
-void solve_lower_transposed(Tree<S>& t, const S* tau, LinkForces forces) {
+void solve_lower_transposed(Tree<S>& t, const S* tau) {
   WalkInput<S> in;
   in.tau = tau;
-  if (forces == LinkForces::kAll)
-    walk<kSolveTransposed | kLinkForces>(t, in);
-  else
-    walk<kSolveTransposed>(t, in);
+  walk<kSolveTransposed>(t, in);
 }
 
 template <class S>

@@ -33,19 +33,19 @@ struct TreeLayout {
   LinkInertia<double> turned_inertia(int body, const Inertial& inertial) const;
 };
 
-/// Packs the constants of a layout for the scalar S.
-template <class S>
-std::vector<LinkConstants<WideConstant<S>>> pack_constants(const TreeLayout& layout) {
-  using K = WideConstant<S>;
-  constexpr int kNumbers = sizeof(LinkConstants<double>) / sizeof(double);
-  std::vector<LinkConstants<K>> out(layout.num_slots);
+/// Numbers per slot of `write_constants`, for each lane of a bundle.
+inline constexpr int kConstantsPerSlot = sizeof(LinkConstants<double>) / sizeof(double);
+
+/// The constants of a layout as kernels with so many lanes per bundle read them: T (slots,
+/// kConstantsPerSlot, lanes), which is LinkConstants of each slot.
+template <class T>
+void write_constants(const TreeLayout& layout, int lanes, T* out) {
   for (int slot = 0; slot < layout.num_slots; ++slot)
-    for (int lane = 0; lane < BundleScalar<S>::kLanes; ++lane) {
-      const auto* from = reinterpret_cast<const double*>(&layout.links[slot * kMaxLanes + lane]);
-      auto* to = reinterpret_cast<K*>(&out[slot]);
-      for (int k = 0; k < kNumbers; ++k) set_lane(to[k], lane, static_cast<Value<S>>(from[k]));
-    }
-  return out;
+    for (int k = 0; k < kConstantsPerSlot; ++k)
+      for (int lane = 0; lane < lanes; ++lane) {
+        const auto& link = layout.links[slot * kMaxLanes + lane];
+        *out++ = static_cast<T>(reinterpret_cast<const double*>(&link)[k]);
+      }
 }
 
 }  // namespace stickslip::dynamics

@@ -13,8 +13,10 @@ class TreeMemory {
  public:
   explicit TreeMemory(const Model& model)
       : layout_(model, BundleScalar<S>::kLanes),
-        constants_(pack_constants<S>(layout_)),
+        constants_(layout_.num_slots),
         links_(layout_.num_slots) {
+    write_constants(layout_, BundleScalar<S>::kLanes,
+                    reinterpret_cast<Value<S>*>(constants_.data()));
     tree_.floating = layout_.floating;
     tree_.num_bundles = static_cast<int>(layout_.bundles.size());
     tree_.num_slots = layout_.num_slots;

@@ -18,9 +18,8 @@ enum Part : unsigned {
   kBias = 16,              // links[].force = minus inertial and gravity load, and velocities
   kMultiply = 32,          // x = L u
   kFactor = 64,            // M + diag(diagonal) = L^T L
-  kSolveTransposed = 128,  // x = L^-T (tau + force on the base)
-  kLinkForces = 256,       // and the forces on the links take part
-  kWrenches = 512,         // adds wrenches to the forces on base and links
+  kSolveTransposed = 128,  // x = L^-T (tau + forces on base and links)
+  kWrenches = 256,         // adds wrenches to the forces on base and links
 };
 
 /// What a walk reads besides the tree; what none of its parts needs may stay unset.
@@ -55,7 +54,7 @@ STICKSLIP_INLINE void start_base(Tree<S>& t, const WalkInput<S>& in) {
     base.acceleration = {zero3<S>(), -in.gravity};
     base.force = -inertial_force(base.inertia, in.angular_velocity, base.acceleration);
   }
-  if constexpr (kParts & kLinkForces)
+  if constexpr (kParts & kBias)
     if (in.base_force) base.force = base.force + *in.base_force;
   if constexpr (kParts & kWrenches)
     if (in.base_wrench) base.force = base.force + force_of_wrench(*in.base_wrench, base.inertia);
@@ -158,14 +157,14 @@ void chain_factor(Tree<S>& t, const Bundle& b, const S* diagonal) {
                                         &LinkState<W>::from_children);
 }
 
-template <bool kLinkForces, class S>
+template <class S>
 void chain_solve_transposed(Tree<S>& t, const Bundle& b, const S* tau, Spatial<S>& on_base) {
   using W = Wide<S>;
   Spatial<W> f = zero_spatial<W>();
   if (b.has_children) f = t.links[b.first_slot + b.length - 1].force_from_children;
   for (int slot = b.first_slot + b.length; slot > b.first_slot;)
     next_block_inward(b, slot, [&](int first, auto n) STICKSLIP_LAMBDA {
-      solve_transposed_block<decltype(n)::value, kLinkForces>(t, first, tau, f);
+      solve_transposed_block<decltype(n)::value>(t, first, tau, f);
     });
   add_to_parents<S, Spatial>(t, b, f, on_base, &LinkState<W>::force_from_children);
 }
@@ -193,8 +192,7 @@ template <unsigned kParts, class S>
 STICKSLIP_INLINE void walk_inward(Tree<S>& t, const Bundle& b, const WalkInput<S>& in,
                                   Spatial<S>& on_base) {
   if constexpr (kParts & kFactor) chain_factor(t, b, in.diagonal);
-  if constexpr (kParts & kSolveTransposed)
-    chain_solve_transposed<(kParts & kLinkForces) != 0>(t, b, in.tau, on_base);
+  if constexpr (kParts & kSolveTransposed) chain_solve_transposed(t, b, in.tau, on_base);
 }
 
 /// The sums over the chains that hang on a link start at zero.
@@ -225,12 +223,7 @@ void walk(Tree<S>& t, const WalkInput<S>& in) {
     if constexpr (kParts & kFactor)
       store(articulated(at_reference(t.base.inertia)), t.base.articulated);
     Spatial<S> on_base;
-    if constexpr (kParts & kSolveTransposed) {
-      if constexpr (kParts & kLinkForces)
-        on_base = t.base.force;
-      else
-        on_base = in.base_force ? *in.base_force : zero_spatial<S>();
-    }
+    if constexpr (kParts & kSolveTransposed) on_base = t.base.force;
     for (int ib = t.num_bundles - 1; ib >= 0; --ib) {
       if constexpr (kAtOnce)
         if (!t.bundles[ib].has_children) walk_outward<kParts>(t, t.bundles[ib], in);

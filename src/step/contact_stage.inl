@@ -327,9 +327,9 @@ void ContactStage<S>::solve(const StepSettings& settings, Mask<S> live, S* warm,
     const contact::FactoredInfo<S> found = contact::solve_factored(problem_, o);
     info.sweeps = found.sweeps;
     info.newton_steps = found.newton_steps + found.fallback_steps;
-    info.residual = select(live, found.residual, info.residual);
+    info.residual = select(live, reported_residual(found.residual), info.residual);
     info.unconverged = live & !found.converged;
-    const Mask<S> open = info.unconverged & is_finite(abs(found.residual));
+    const Mask<S> open = info.unconverged & is_finite(found.residual);
     if (any(open) && settings.host.solve && !o.max_dissipation)
       solve_by_chain(settings.host, open, o.residual_tolerance, found.allowed, info);
   }
@@ -436,7 +436,7 @@ void ContactStage<S>::solve_by_method(const HostSolver& host, LaneInfo<S>& info)
     const HostSolver::Effort effort = ask_host(host, problem_, 0);
     info.sweeps = effort.sweeps;
     info.newton_steps = 0;
-    info.residual = effort.residual;
+    info.residual = reported_residual(effort.residual);
     info.unconverged = !effort.solved;
   }
 }

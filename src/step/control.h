@@ -73,17 +73,19 @@ Spatial<S> base_control(const RobotLanes<S>& robot) {
   return {{f[3], f[4], f[5]}, {f[0], f[1], f[2]}};
 }
 
-/// Adds the users' wrenches to the forces on base and links.
+/// What drives and wrenches do to base and links, as the forces of the tree.
 template <class S>
-void add_wrenches(RobotLanes<S>& robot) {
-  if (!robot.control.wrenches) return;
+void set_forces(RobotLanes<S>& robot) {
   dynamics::Tree<S>& t = *robot.tree;
-  t.base.force =
-      t.base.force + dynamics::force_of_wrench(*robot.control.base_wrench, t.base.inertia);
+  const auto* wrenches = robot.control.wrenches;
+  t.base.force = base_control(robot);
+  if (wrenches)
+    t.base.force =
+        t.base.force + dynamics::force_of_wrench(*robot.control.base_wrench, t.base.inertia);
   for (int slot = 0; slot < t.num_slots; ++slot)
-    t.links[slot].force =
-        t.links[slot].force +
-        dynamics::force_of_wrench(robot.control.wrenches[slot], t.links[slot].inertia);
+    t.links[slot].force = wrenches
+                              ? dynamics::force_of_wrench(wrenches[slot], t.links[slot].inertia)
+                              : zero_spatial<dynamics::Wide<S>>();
 }
 
 }  // namespace stickslip::step::inline STICKSLIP_KERNELS

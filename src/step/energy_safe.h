@@ -196,11 +196,8 @@ class EnergySafeStep {
     fall_ = state().pending_gravity + h - late_;
     add_gravity(fall_, free);
     if (control_force(robot_, q(), u(), h)) {
-      t_.base.force = base_control(robot_);
-      for (int slot = 0; slot < t_.num_slots; ++slot)
-        t_.links[slot].force = zero_spatial<dynamics::Wide<S>>();
-      add_wrenches(robot_);
-      dynamics::solve_lower_transposed<S>(t_, robot_.force + offset_, dynamics::LinkForces::kAll);
+      set_forces(robot_);
+      dynamics::solve_lower_transposed<S>(t_, robot_.force + offset_);
       solve_lower(robot_.delta);
       for (int k = 0; k < nu_; ++k) free[k] = madd(h, robot_.delta[k], free[k]);
     }
@@ -455,7 +452,7 @@ template <class S>
 void step_energy_safe(RobotLanes<S>& robot, const StepSettings& settings) {
   const RobotTables& t = *robot.tables;
   LaneState<S>&s = robot.state, &backup = robot.backup;
-  copy_state_where(t, !none<S>(), s, backup);
+  copy_state(t, s, backup);
   const Mask<S> failed = EnergySafeStep<S>(robot, settings).run();
   if (!any(failed)) return;
   const S zero = constant<S>(0);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <new>
 
 #include "contact/explicit_problem.h"
 #include "contact/method_of.h"
@@ -12,8 +11,6 @@
 
 namespace stickslip::step {
 namespace {
-
-void free_block(char* block) { ::operator delete(block, std::align_val_t(64)); }
 
 /// Of the explicit view of a problem and, for the chain, its best impulse and its stages.
 size_t bytes(int contacts, bool chain) {
@@ -40,10 +37,7 @@ SolverOnHost::SolverOnHost(int max_points, const StepSolverOptions& options)
       max_contacts_(options.method == SolveMethod::kAuto
                         ? std::min(max_points, solvers::kRobotSized)
                         : max_points),
-      memory_(
-          static_cast<char*>(::operator new(
-              bytes(max_contacts_, options.method == SolveMethod::kAuto), std::align_val_t(64))),
-          free_block) {}
+      memory_(bytes(max_contacts_, options.method == SolveMethod::kAuto)) {}
 
 HostSolver SolverOnHost::view() {
   const bool automatic = options_.method == SolveMethod::kAuto;
@@ -53,7 +47,7 @@ HostSolver SolverOnHost::view() {
 HostSolver::Effort SolverOnHost::run_method(void* self, DenseProblem& d, double) {
   const auto& solver = *static_cast<SolverOnHost*>(self);
   const StepSolverOptions& options = solver.options_;
-  contact::ExplicitProblem p = view_of(d, reinterpret_cast<double*>(solver.memory_.get()));
+  contact::ExplicitProblem p = view_of(d, reinterpret_cast<double*>(solver.memory_.data()));
   contact::SweepOptions o;
   o.max_dissipation = options.law == FrictionLaw::kMaxDissipation;
   o.method = contact::method_of(options.single_contact);
@@ -75,7 +69,7 @@ HostSolver::Effort SolverOnHost::run_method(void* self, DenseProblem& d, double)
 
 HostSolver::Effort SolverOnHost::run_chain(void* self, DenseProblem& d, double tolerance) {
   const auto& solver = *static_cast<SolverOnHost*>(self);
-  std::pmr::monotonic_buffer_resource memory(solver.memory_.get(), bytes(d.contacts, true));
+  std::pmr::monotonic_buffer_resource memory(solver.memory_.data(), bytes(d.contacts, true));
   solvers::Doubles workspace(contact::ExplicitProblem::workspace_size(d.contacts), &memory);
   contact::ExplicitProblem p = view_of(d, workspace.data());
   solvers::BestImpulse best(tolerance, false, nullptr, &memory);

@@ -4,9 +4,7 @@
 #pragma once
 #include <stickslip/world.h>
 
-#include <memory>
-#include <vector>
-
+#include "step/aligned_block.h"
 #include "step/step_tables.h"
 
 namespace stickslip::step {
@@ -25,7 +23,7 @@ class SolverOnHost {
 
   StepSolverOptions options_;
   int max_contacts_;
-  std::unique_ptr<char, void (*)(char*)> memory_;
+  AlignedBlock memory_;
 };
 
 /// Seconds of a steady clock.

@@ -23,6 +23,12 @@ template <class S>
 STICKSLIP_INLINE Mask<S> is_finite(S sum_of_sizes) {
   return sum_of_sizes <= constant<S>(sizeof(Value<S>) == 4 ? 3.4028234e38 : 1.7976931348623157e308);
 }
+/// A residual as it is reported: infinite where the problem was refused, so that the largest of
+/// several says so.
+template <class S>
+STICKSLIP_INLINE S reported_residual(S residual) {
+  return select(is_finite(residual), residual, constant<S>(__builtin_inf()));
+}
 /// Sums of sizes in four chains, to end in `is_finite`: only whether it is finite counts.
 template <class S>
 STICKSLIP_INLINE S sum_of_sizes(const S* values, int n, S sum) {

@@ -9,20 +9,24 @@
 #include "dynamics/mass_matrix.h"
 #include "model/pose.h"
 #include "step/robot_impl.h"
+#include "step/state_check.h"
 
 namespace stickslip {
 namespace {
 
 using dynamics::LinkIndex;
 
-constexpr double kLargestJoint = 1e9;  // beyond, an angle holds less than seven digits of its turn
-
 // Names are put together for errors only: setters are called every step and may not allocate.
-void check(const std::string& owner, const char* what, std::span<const double> values,
-           size_t size) {
+void check_size(const std::string& owner, const char* what, std::span<const double> values,
+                size_t size) {
   if (values.size() != size)
     throw ModelError(owner + what + ": expected " + std::to_string(size) + " numbers, got " +
                      std::to_string(values.size()));
+}
+
+void check(const std::string& owner, const char* what, std::span<const double> values,
+           size_t size) {
+  check_size(owner, what, values, size);
   for (size_t k = 0; k < size; ++k)
     if (!std::isfinite(values[k]))
       throw ModelError(owner + what + "[" + std::to_string(k) + "] is not finite");
@@ -82,24 +86,16 @@ std::span<const double> Robot::pd_target() const { return impl_->data.control.ta
 
 void Robot::set_state(std::span<const double> q, std::span<const double> u) {
   step::RobotData& d = impl_->data;
-  check(d.name, ".q", q, d.state.q.size());
-  check(d.name, ".u", u, d.state.u.size());
-  double norm = 1;
-  if (d.floating()) {
-    norm = std::sqrt(q[3] * q[3] + q[4] * q[4] + q[5] * q[5] + q[6] * q[6]);
-    if (std::fabs(norm - 1) > 1e-3)
-      throw ModelError(d.name + ".q[3:7]: the base quaternion (w, x, y, z) has length " +
-                       std::to_string(norm) + "; it must be a unit quaternion");
-  }
-  for (int j = 0; j < d.num_joints(); ++j)
-    if (std::fabs(d.joints(q.data())[j]) > kLargestJoint)
-      throw ModelError(d.name + ".q: joint '" + d.model->joints()[j].name +
-                       "' is beyond 1e9 rad or m; wrap continuous joints");
+  check_size(d.name, ".q", q, d.state.q.size());
+  check_size(d.name, ".u", u, d.state.u.size());
+  if (const std::string fault = step::state_fault(*d.model, q.data(), u.data()); !fault.empty())
+    throw ModelError(d.name + "." + fault);
+  const double length = step::quaternion_length(*d.model, q.data());
   step::RobotState& s = d.state;
   std::copy(q.begin(), q.end(), s.q.begin());
   std::copy(u.begin(), u.end(), s.u.begin());
   if (d.floating())
-    for (int k = 3; k < 7; ++k) s.q[k] /= norm;
+    for (int k = 3; k < 7; ++k) s.q[k] /= length;
   std::fill(s.impulse.begin(), s.impulse.end(), 0.0);
   std::fill(s.drift_acceleration.begin(), s.drift_acceleration.end(), 0.0);
   s.pending_gravity = 0;
@@ -164,7 +160,7 @@ void Robot::forward_dynamics(std::span<const double> tau, std::span<double> out)
   if (offset)
     t.base.force =
         t.base.force + Spatial<double>{{tau[3], tau[4], tau[5]}, {tau[0], tau[1], tau[2]}};
-  dynamics::solve_lower_transposed(t, tau.data() + offset, dynamics::LinkForces::kAll);
+  dynamics::solve_lower_transposed(t, tau.data() + offset);
   double base[6];
   dynamics::solve_lower(t, base, out.data() + offset);
   for (int k = 0; k < offset; ++k) out[k] = base[k];
@@ -269,7 +265,7 @@ void Robot::Impl::gravity_acceleration(double* out) {
   dynamics::Tree<double>& t = tree_at_state();
   dynamics::factor_mass_matrix<double>(t, nullptr);
   dynamics::compute_bias(t, zero3<double>(), out + offset, gravity);
-  dynamics::solve_lower_transposed<double>(t, nullptr, dynamics::LinkForces::kAll);
+  dynamics::solve_lower_transposed<double>(t, nullptr);
   double base[6];
   dynamics::solve_lower(t, base, out + offset);
   for (int k = 0; k < offset; ++k) out[k] = base[k];

@@ -1,25 +1,18 @@
 #include "step/robot_data.h"
 
 #include <algorithm>
-#include <new>
 
 #include "step/integrators.h"
 
 namespace stickslip::step {
 namespace {
 
-void free_block(char* block) { ::operator delete(block, std::align_val_t(64)); }
-
 /// Lays the lanes out in a block of their own.
-std::unique_ptr<char, void (*)(char*)> give_memory(RobotLanes<double>& lanes,
-                                                   const RobotTables& tables) {
+AlignedBlock give_memory(RobotLanes<double>& lanes, const RobotTables& tables) {
   contact::Arena count(nullptr);
   lanes.lay_out(count, tables);
-  const size_t bytes = static_cast<size_t>(count.used());
-  std::unique_ptr<char, void (*)(char*)> block(
-      static_cast<char*>(::operator new(bytes, std::align_val_t(64))), free_block);
-  std::fill(block.get(), block.get() + bytes, 0);
-  contact::Arena arena(block.get());
+  AlignedBlock block(static_cast<size_t>(count.used()));
+  contact::Arena arena(block.data());
   lanes.lay_out(arena, tables);
   return block;
 }

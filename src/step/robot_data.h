@@ -2,8 +2,6 @@
 #pragma once
 #include <stickslip/world.h>
 
-#include <memory>
-
 #include "dynamics/tree_memory.h"
 #include "step/host_solver.h"
 #include "step/robot_lanes.h"
@@ -64,7 +62,7 @@ struct RobotData {
   void step(StepSettings settings, const Vec3<double>& gravity);
 
  private:
-  std::unique_ptr<char, void (*)(char*)> block_;  // of the lanes
+  AlignedBlock block_;  // of the lanes
 };
 
 }  // namespace stickslip::step

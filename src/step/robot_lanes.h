@@ -105,6 +105,16 @@ struct RobotLanes {
   }
 };
 
+/// `to` becomes a copy of `from`, whatever it held.
+template <class S>
+STICKSLIP_INLINE void copy_state(const RobotTables& t, const LaneState<S>& from, LaneState<S>& to) {
+  copy(from.q, t.nq, to.q);
+  copy(from.u, t.nu, to.u);
+  copy(from.impulse, 3 * t.num_points, to.impulse);
+  copy(from.drift_acceleration, t.nu, to.drift_acceleration);
+  to.pending_gravity = from.pending_gravity;
+  to.fresh = from.fresh;
+}
 /// The state of the lanes `m` becomes that of `from`.
 template <class S>
 STICKSLIP_INLINE void copy_state_where(const RobotTables& t, Mask<S> m, const LaneState<S>& from,

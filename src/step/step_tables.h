@@ -5,6 +5,10 @@
 
 namespace stickslip::step {
 
+inline constexpr double kLargestJoint =
+    1e9;  // beyond, an angle holds less than seven digits of its turn
+inline constexpr double kQuaternionTolerance = 1e-3;  // of a length of one; then it is normalized
+
 /// One robot, as the step sees it. Owned by whoever made the model's layout.
 struct RobotTables {
   bool floating;

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "backend/cpu/batch_impl.h"
+#include "step/state_check.h"
 
 namespace stickslip {
 namespace {
@@ -23,25 +24,6 @@ void check_options(const BatchOptions& o) {
   if (o.num_threads < 0 || o.num_threads > 1024)
     reject(": num_threads is " + std::to_string(o.num_threads) +
            "; it must be 0 (one per core) to 1024");
-}
-
-void check_state(const Model& model, const double* q, const double* u, std::size_t row) {
-  const std::string where = ".reset: row " + std::to_string(row) + " of ";
-  for (int k = 0; k < model.nq(); ++k)
-    if (!std::isfinite(q[k])) reject(where + "q: number " + std::to_string(k) + " is not finite");
-  for (int k = 0; k < model.nu(); ++k)
-    if (!std::isfinite(u[k])) reject(where + "u: number " + std::to_string(k) + " is not finite");
-  const bool floating = model.base() == BaseType::kFloating;
-  if (floating) {
-    const double norm = std::sqrt(q[3] * q[3] + q[4] * q[4] + q[5] * q[5] + q[6] * q[6]);
-    if (std::fabs(norm - 1) > 1e-3)
-      reject(where + "q: the base quaternion (w, x, y, z) has length " + std::to_string(norm) +
-             "; it must be a unit quaternion");
-  }
-  for (int j = 0; j < model.num_joints(); ++j)
-    if (std::fabs(q[(floating ? 7 : 0) + j]) > 1e9)
-      reject(where + "q: joint '" + model.joints()[j].name +
-             "' is beyond 1e9 rad or m; wrap continuous joints");
 }
 
 }  // namespace
@@ -124,7 +106,9 @@ void Batch::reset(std::span<const std::int64_t> envs, std::span<const double> q,
   const auto u_of = [&](std::size_t k) {
     return u.empty() ? impl_->start_u.data() : u.data() + k * nu;
   };
-  for (std::size_t k = 0; k < n; ++k) check_state(model(), q_of(k), u_of(k), k);
+  for (std::size_t k = 0; k < n; ++k)
+    if (const std::string fault = step::state_fault(model(), q_of(k), u_of(k)); !fault.empty())
+      reject(".reset: row " + std::to_string(k) + ", " + fault);
   for (std::size_t k = 0; k < n; ++k) impl_->reset(envs[k], q_of(k), u_of(k));
 }
 

@@ -7,6 +7,8 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "step/state_check.h"
+
 namespace stickslip {
 namespace {
 
@@ -29,19 +31,6 @@ const PackKernels& choose_kernels(const BatchOptions& o) {
                    (set.empty() ? "" : " for " + set));
 }
 
-/// LinkConstants of a layout as the kernels read them: T (slots, numbers, lanes of a bundle).
-template <class T>
-void write_constants(const dynamics::TreeLayout& layout, int lanes, char* out) {
-  constexpr int kNumbers = sizeof(dynamics::LinkConstants<double>) / sizeof(double);
-  T* to = reinterpret_cast<T*>(out);
-  for (int slot = 0; slot < layout.num_slots; ++slot)
-    for (int k = 0; k < kNumbers; ++k)
-      for (int lane = 0; lane < lanes; ++lane) {
-        const auto& link = layout.links[slot * dynamics::kMaxLanes + lane];
-        *to++ = static_cast<T>(reinterpret_cast<const double*>(&link)[k]);
-      }
-}
-
 std::size_t constants_bytes(const dynamics::TreeLayout& layout, const PackKernels& kernels) {
   return std::max(1, layout.num_slots) * sizeof(dynamics::LinkConstants<double>) *
          kernels.bundle_lanes;
@@ -60,7 +49,7 @@ int thread_count(const BatchOptions& o, long packs) {
 Batch::Impl::Worker::Worker(const PackKernels& kernels, const backend::PackScene& scene,
                             const StepSolverOptions& solver)
     : host(scene.tables->num_points, solver) {
-  workspace.allocate(static_cast<std::size_t>(kernels.workspace_bytes(scene)));
+  workspace = step::AlignedBlock(static_cast<std::size_t>(kernels.workspace_bytes(scene)));
   kernels.prepare(workspace.data(), scene);
 }
 
@@ -84,7 +73,8 @@ Batch::Impl::Impl(const World::Impl& world, const BatchOptions& o)
   fill_pack_scene();
   fill_parameters(world.data(0), world.gravity);
   const int number = o.precision == Precision::kFloat32 ? 4 : 8;
-  history_block.allocate(static_cast<std::size_t>(padded) * history_rows.numbers * number);
+  history_block =
+      step::AlignedBlock(static_cast<std::size_t>(padded) * history_rows.numbers * number);
   fill_start(world.data(0));
   for (int k = 0; k < pool.size(); ++k) {
     workers.push_back(std::make_unique<Worker>(*kernels, pack_scene, world_options.solver));
@@ -103,11 +93,13 @@ Batch::Impl::Hold::Hold(Impl& batch, const char* what) : batch_(batch) {
 }
 
 void Batch::Impl::fill_pack_scene() {
-  constants.allocate(constants_bytes(layout, *kernels));
+  constants = step::AlignedBlock(constants_bytes(layout, *kernels));
   if (kernels->single)
-    write_constants<float>(layout, kernels->bundle_lanes, constants.data());
+    dynamics::write_constants(layout, kernels->bundle_lanes,
+                              reinterpret_cast<float*>(constants.data()));
   else
-    write_constants<double>(layout, kernels->bundle_lanes, constants.data());
+    dynamics::write_constants(layout, kernels->bundle_lanes,
+                              reinterpret_cast<double*>(constants.data()));
   backend::PackScene& p = pack_scene;
   p.tables = &scene.tables();
   p.num_bundles = static_cast<int>(layout.bundles.size());
@@ -170,11 +162,10 @@ void Batch::Impl::set_history(long env, int row, double value) {
 void Batch::Impl::reset(long env, const double* q, const double* u) {
   using enum BatchField;
   const step::RobotTables& t = scene.tables();
-  double norm = 1;
-  if (t.floating) norm = std::sqrt(q[3] * q[3] + q[4] * q[4] + q[5] * q[5] + q[6] * q[6]);
+  const double length = step::quaternion_length(*model, q);
   for (int k = 0; k < history_rows.numbers; ++k) set_history(env, k, 0);
   for (int k = 0; k < t.nq; ++k) {
-    const double x = t.floating && k >= 3 && k < 7 ? q[k] / norm : q[k];
+    const double x = t.floating && k >= 3 && k < 7 ? q[k] / length : q[k];
     memory.set(kQ, env, k, x);
     set_history(env, history_rows.q + k, x);
   }

@@ -21,7 +21,7 @@ struct Batch::Impl {
   struct Worker {
     Worker(const backend::PackKernels& kernels, const backend::PackScene& scene,
            const StepSolverOptions& solver);
-    backend::Block workspace;
+    step::AlignedBlock workspace;
     step::SolverOnHost host;
     step::StepSettings settings;
     double stages[step::kNumStages] = {};
@@ -58,13 +58,13 @@ struct Batch::Impl {
   std::string instruction_set;
   dynamics::TreeLayout layout;
   step::RobotScene scene;
-  backend::Block constants;
+  step::AlignedBlock constants;
   backend::PackScene pack_scene;
   backend::PackHistory history_rows;
   step::StepSettings settings;
   long padded;
   backend::BatchMemory memory;
-  backend::Block history_block;
+  step::AlignedBlock history_block;
   backend::BodyParameters bodies;
   bool force = false;  // generalized forces are in use
   std::vector<double> start_q, start_u;

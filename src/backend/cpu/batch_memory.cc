@@ -1,22 +1,8 @@
 #include "backend/cpu/batch_memory.h"
 
-#include <stickslip/errors.h>
-
 #include <cstring>
-#include <new>
 
 namespace stickslip::backend {
-
-void Block::allocate(std::size_t bytes) {
-  constexpr std::size_t kSlack = 64;
-  void* p = ::operator new(bytes + kSlack, std::align_val_t(64), std::nothrow);
-  if (!p)
-    throw ModelError("Batch: no memory for " + std::to_string(bytes) +
-                     " bytes; use fewer environments");
-  std::memset(p, 0, bytes + kSlack);
-  data_.reset(static_cast<char*>(p));
-  bytes_ = bytes + kSlack;
-}
 
 std::size_t size_of(NumberType type) {
   switch (type) {
@@ -91,7 +77,7 @@ BatchMemory::BatchMemory(const step::RobotTables& t, Precision precision, long n
   define(kExternalWrench, number, {t.num_bodies, 6});
   for (const BatchField f : {kGeneralizedForce, kPdTarget, kKp, kKd, kFriction, kGravity, kBodyMass,
                              kBodyCom, kBodyInertia, kExternalWrench})
-    field(f).shared.allocate(row(f) * size_of(type(f)));
+    field(f).shared = step::AlignedBlock(row(f) * size_of(type(f)));
 }
 
 long BatchMemory::row(BatchField f) const {
@@ -104,7 +90,7 @@ char* BatchMemory::data(BatchField f) {
   Field& x = field(f);
   if (x.block) return x.block.data();
   const std::size_t bytes = row(f) * size_of(x.type);
-  x.block.allocate(padded_ * bytes);
+  x.block = step::AlignedBlock(padded_ * bytes);
   if (x.shared)
     for (long env = 0; env < padded_; ++env)
       std::memcpy(x.block.data() + env * bytes, x.shared.data(), bytes);

@@ -5,25 +5,10 @@
 
 #include <array>
 
+#include "step/aligned_block.h"
 #include "step/step_tables.h"
 
 namespace stickslip::backend {
-
-/// A block of zeros, aligned to a cache line, with room behind it for the last read of a pack.
-class Block {
- public:
-  void allocate(std::size_t bytes);  // throws ModelError where memory is short
-  char* data() const { return data_.get(); }
-  std::size_t bytes() const { return bytes_; }
-  explicit operator bool() const { return data_ != nullptr; }
-
- private:
-  struct Free {
-    void operator()(char* p) const { ::operator delete(p, std::align_val_t(64)); }
-  };
-  std::unique_ptr<char, Free> data_;
-  std::size_t bytes_ = 0;
-};
 
 std::size_t size_of(NumberType type);
 
@@ -51,7 +36,7 @@ class BatchMemory {
   struct Field {
     NumberType type;
     std::vector<int> shape;  // of one environment
-    Block block, shared;
+    step::AlignedBlock block, shared;
   };
   static constexpr int kFields = static_cast<int>(BatchField::kExternalWrench) + 1;
   Field& field(BatchField f) { return fields_[static_cast<int>(f)]; }

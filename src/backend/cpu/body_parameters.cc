@@ -13,10 +13,9 @@ void BodyParameters::allocate(BatchMemory& memory) {
   }
   const std::size_t per_link = static_cast<std::size_t>(kNumbers) * lanes() * number_bytes();
   const long packs = padded_ / kernels_.width;
-  Block links, base, seen;  // all or none
-  links.allocate(packs * layout_.num_slots * per_link);
-  base.allocate(static_cast<std::size_t>(padded_) * kNumbers * number_bytes());
-  seen.allocate(padded_ * row);
+  using step::AlignedBlock;  // all or none
+  AlignedBlock links(packs * layout_.num_slots * per_link),
+      base(static_cast<std::size_t>(padded_) * kNumbers * number_bytes()), seen(padded_ * row);
   links_ = std::move(links), base_ = std::move(base), seen_ = std::move(seen);
   for (long env = 0; env < padded_; ++env) {
     char* seen = seen_.data() + env * row;

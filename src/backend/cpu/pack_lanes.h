@@ -149,7 +149,7 @@ template <class S>
 void PackLanes<S>::check_state() {
   const step::RobotTables& t = *scene_.tables;
   step::LaneState<S>& s = robot_.state;
-  const S zero = constant<S>(0), one = constant<S>(1), largest = constant<S>(1e9);
+  const S zero = constant<S>(0), one = constant<S>(1), largest = constant<S>(step::kLargestJoint);
   Mask<S> same = !step::none<S>();
   for (int k = 0; k < t.nq; ++k) same = same & (s.q[k] >= last_q_[k]) & (s.q[k] <= last_q_[k]);
   for (int k = 0; k < t.nu; ++k) same = same & (s.u[k] >= last_u_[k]) & (s.u[k] <= last_u_[k]);
@@ -162,7 +162,7 @@ void PackLanes<S>::check_state() {
   if (t.floating) {
     S* p = s.q + 3;
     const S norm = sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3]);
-    good = good & (abs(norm - one) <= constant<S>(1e-3));
+    good = good & (abs(norm - one) <= constant<S>(step::kQuaternionTolerance));
     for (int k = 0; k < 4; ++k) p[k] = select((!same) & good, p[k] / norm, p[k]);
   }
   set_aside_ = !(good | same);

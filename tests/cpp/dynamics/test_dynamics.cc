@@ -60,7 +60,7 @@ std::vector<S> run_kernels(const Model& model, const std::vector<std::vector<dou
   compute_inertias(t);
   factor_mass_matrix(t, r.extra.data());
   compute_bias(t, r.w, r.rates.data(), r.gravity);
-  solve_lower_transposed(t, r.rates.data(), LinkForces::kAll);
+  solve_lower_transposed(t, r.rates.data());
   out.push_back(solve_lower(t, r.base, r.joints.data()));
   out.insert(out.end(), r.base, r.base + 6);
   out.insert(out.end(), r.joints.begin(), r.joints.end());
@@ -147,7 +147,7 @@ void compare_fused() {
     for (int slot = 0; slot < a.num_slots; ++slot)
       a.links[slot].force =
           a.links[slot].force + force_of_wrench(in.wrenches[slot], a.links[slot].inertia);
-    solve_lower_transposed(a, in.tau, LinkForces::kAll);
+    solve_lower_transposed(a, in.tau);
     a.base.force = {}, f.base.force = {};
     compute_free_motion(f, in);
     f.base.force = {};
@@ -161,14 +161,14 @@ void compare_fused() {
     CHECK(numbers(alone, true) == numbers(fused, true));
 
     compute_bias(a, in.angular_velocity, in.joints, in.gravity);
-    solve_lower_transposed<S>(a, nullptr, LinkForces::kAll);
+    solve_lower_transposed<S>(a, nullptr);
     solve_bias(f, in.angular_velocity, in.joints, in.gravity);
     CHECK(numbers(alone, true) == numbers(fused, true));
 
     compute_inertias(a);
     factor_mass_matrix(a, in.diagonal);
     compute_bias(a, in.angular_velocity, in.rates, in.gravity);
-    solve_lower_transposed<S>(a, nullptr, LinkForces::kAll);
+    solve_lower_transposed<S>(a, nullptr);
     factor_and_solve_bias(f, in.diagonal, in.angular_velocity, in.rates, in.gravity);
     const S norm = squared_norm(a), same = solve_lower(f, fused.base, fused.joints.data());
     solve_lower(a, alone.base, alone.joints.data());
@@ -347,7 +347,9 @@ TEST(SolvesInvertTheMassMatrix) {
     std::vector<RigidInertia<Wide<double>>> scratch(t.num_slots);
     std::vector<double> m(nu * nu), a(nu);
     compute_mass_matrix(t, scratch.data(), m.data());
-    solve_lower_transposed(t, s.data() + 7, LinkForces::kNone);
+    t.base.force = {};
+    for (int slot = 0; slot < t.num_slots; ++slot) t.links[slot].force = {};
+    solve_lower_transposed(t, s.data() + 7);
     double base[6];
     solve_lower(t, base, a.data() + offset);
     for (int k = 0; k < offset; ++k) a[k] = base[k];
