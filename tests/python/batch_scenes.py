@@ -13,7 +13,10 @@ MODEL = ss.load_urdf(ss.assets.path("anymal_b"))
 STANCE = np.array(
     [{"HAA": 0.0, "HFE": 0.4, "KFE": -0.8}[name[3:]] * (1 if name[1] == "F" else -1) for name in MODEL.joint_names]
 )
+NUMBERS = {"float32": np.float32, "float64": np.float64}
+INTEGRATORS = ("energy_safe", "semi_implicit")
 OUTPUTS = ("contact_impulse", "contact_active", "status", "residual", "time")
+PARAMETERS = ("kp", "kd", "friction", "gravity", "body_mass", "body_com", "body_inertia", "external_wrench")
 
 
 def anymal(model: ss.Model = MODEL, height: float = 0.52, **options) -> ss.World:
@@ -71,10 +74,24 @@ def scattered_states(num_envs: int, seed: int = 7) -> tuple[np.ndarray, np.ndarr
     return q, u
 
 
+def scattered(num_envs: int, dtype: str = "float64", num_threads: int = 1, **options) -> ss.Batch:
+    """ANYmals in `scattered_states`."""
+    batch = ss.Batch(anymal(**options), num_envs, dtype, num_threads)
+    batch.reset(None, *scattered_states(num_envs))
+    return batch
+
+
 def drive(batch: Any, step: int) -> None:
     """Targets that move with time, other ones for each environment and the same whatever the number of environments."""
     phase = np.arange(batch.num_envs)[:, None] + 0.02 * step + np.arange(batch.model.num_joints)
     batch.pd_target[:] = STANCE + 0.2 * np.sin(phase)
+
+
+def run(batch: ss.Batch, steps: int, first: int = 0) -> None:
+    """So many steps, driven, from step `first` on."""
+    for step in range(first, first + steps, 5):
+        drive(batch, step)
+        batch.step(5)
 
 
 def same_bits(a: np.ndarray, b: np.ndarray) -> bool:

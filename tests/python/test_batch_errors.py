@@ -9,13 +9,9 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from batch_scenes import MODEL, anymal, arm
+from batch_scenes import MODEL, OUTPUTS, PARAMETERS, anymal, arm
 
-ARRAYS = (
-    *("q", "u", "generalized_force", "pd_target"),
-    *("contact_impulse", "contact_active", "status", "residual", "time"),
-    *("kp", "kd", "friction", "gravity", "body_mass", "body_com", "body_inertia", "external_wrench"),
-)
+ARRAYS = ("q", "u", "generalized_force", "pd_target", *OUTPUTS, *PARAMETERS)
 
 
 @pytest.fixture
