@@ -45,6 +45,13 @@ def count(name: str, value: Any) -> int:
     return result
 
 
+def saved_state(name: str, value: Any) -> bytes:
+    """What `save_state` returned, or a copy of it in another kind of buffer."""
+    if not isinstance(value, (bytes, bytearray, memoryview)):
+        raise TypeError(f"{name} is a {type(value).__name__}; bytes from save_state are wanted")
+    return bytes(value)
+
+
 def array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
     """Finite float64 numbers of this shape, contiguous. May share memory with `value`."""
     try:

@@ -16,10 +16,11 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from stickslip import _batch_inputs as inputs
 from stickslip import _core
-from stickslip._arguments import count
+from stickslip._arguments import count, saved_state
 from stickslip._batch_inputs import Columns
 from stickslip._core import Model
-from stickslip.reports import StageTimes, StepStatus
+from stickslip._profiling import Profiled
+from stickslip.reports import StepStatus
 from stickslip.world import World
 
 __all__ = ["Batch", "ContactPoint"]
@@ -38,7 +39,7 @@ class ContactPoint:
     point: int  #: of the shape; a box has 8 corners
 
 
-class Batch:
+class Batch(Profiled):
     """Copies of a world with one robot, each with state, inputs and, where asked for, parameters of its own.
 
     world: gives robot, gravity, ground, materials, options, gains, forces and present state; it is not touched, and may go.
@@ -384,25 +385,7 @@ class Batch:
 
     def load_state(self, blob: bytes) -> None:
         """Goes back to a saved state. ValueError if it is not of such a batch; nothing changes then."""
-        if not isinstance(blob, (bytes, bytearray, memoryview)):
-            raise TypeError(f"blob is a {type(blob).__name__}; bytes from save_state are wanted")
-        self._core.load_state(bytes(blob))
-
-    # Measuring
-
-    def set_profiling(self, on: bool) -> None:
-        """Counts the time of each stage of a step (a little slower)."""
-        self._core.set_profiling(bool(on))
-
-    @property
-    def stage_times(self) -> StageTimes:
-        """Time per stage since the last reset, of all threads, summed; `steps` counts robot-steps."""
-        t = self._core.stage_times
-        return StageTimes(t.dynamics, t.detection, t.delassus, t.solve, t.integrate, t.steps)
-
-    def reset_stage_times(self) -> None:
-        """Starts counting from zero."""
-        self._core.reset_stage_times()
+        self._core.load_state(saved_state("blob", blob))
 
     # Memory and checks
 

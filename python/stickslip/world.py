@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip import _core
-from stickslip._arguments import array, count, number
+from stickslip._arguments import array, count, number, saved_state
 from stickslip._core import Model, Pose, load_urdf
+from stickslip._profiling import Profiled
 from stickslip.contact import ContactProblem
 from stickslip.reports import Contact, SolveInfo, StageTimes, StepStatus
 
@@ -253,7 +254,7 @@ class Robot:
         return ContactProblem(*self._world._core.next_contact_problem(index))
 
 
-class World:
+class World(Profiled):
     """One scene.
 
     time_step: [s]
@@ -452,25 +453,7 @@ class World:
 
     def load_state(self, blob: bytes) -> None:
         """Goes back to a saved state. ValueError if it is not of a world with the same robots; nothing changes then."""
-        if not isinstance(blob, (bytes, bytearray, memoryview)):
-            raise TypeError(f"blob is a {type(blob).__name__}; bytes from save_state are wanted")
-        self._core.load_state(bytes(blob))
-
-    # Measuring
-
-    def set_profiling(self, on: bool) -> None:
-        """Counts the time of each stage of a step (a little slower)."""
-        self._core.set_profiling(bool(on))
-
-    @property
-    def stage_times(self) -> StageTimes:
-        """Time per stage since the last reset."""
-        t = self._core.stage_times
-        return StageTimes(t.dynamics, t.detection, t.delassus, t.solve, t.integrate, t.steps)
-
-    def reset_stage_times(self) -> None:
-        """Starts counting from zero."""
-        self._core.reset_stage_times()
+        self._core.load_state(saved_state("blob", blob))
 
 
 def _model(robot: str | os.PathLike[str] | Model, base: str | None) -> Model:
