@@ -30,39 +30,24 @@ class ObservationTerm(NamedTuple):
     noise: ArrayLike = 0.0  #: uniform, +- this, before the scale; used with `observation_noise=True`
 
 
-def base_linear_velocity(state: LocomotionState) -> Array:
-    """(n, 3) of the base origin, base axes [m/s]."""
-    return state.base_linear_velocity
+def _entry(name: str, doc: str) -> Callable[[LocomotionState], Array]:
+    """The term that is an entry of the state as it is; a module-level name like any function, so that it can be pickled."""
+
+    def term(state: LocomotionState) -> Array:
+        return getattr(state, name)
+
+    term.__name__ = term.__qualname__ = name
+    term.__doc__ = doc
+    return term
 
 
-def base_angular_velocity(state: LocomotionState) -> Array:
-    """(n, 3) base axes [rad/s]."""
-    return state.base_angular_velocity
-
-
-def projected_gravity(state: LocomotionState) -> Array:
-    """(n, 3) unit vector of gravity in base axes: where is down."""
-    return state.projected_gravity
-
-
-def commands(state: LocomotionState) -> Array:
-    """(n, 3) wanted velocity forward, to the left [m/s], and yaw rate [rad/s]."""
-    return state.commands
-
-
-def joint_position(state: LocomotionState) -> Array:
-    """(n, joints) offset from the default angles [rad]."""
-    return state.joint_position
-
-
-def joint_velocity(state: LocomotionState) -> Array:
-    """(n, joints) [rad/s]."""
-    return state.joint_velocity
-
-
-def actions(state: LocomotionState) -> Array:
-    """(n, actions) the last ones."""
-    return state.actions
+base_linear_velocity = _entry("base_linear_velocity", "(n, 3) of the base origin, base axes [m/s].")
+base_angular_velocity = _entry("base_angular_velocity", "(n, 3) base axes [rad/s].")
+projected_gravity = _entry("projected_gravity", "(n, 3) unit vector of gravity in base axes: where is down.")
+commands = _entry("commands", "(n, 3) wanted velocity forward, to the left [m/s], and yaw rate [rad/s].")
+joint_position = _entry("joint_position", "(n, joints) offset from the default angles [rad].")
+joint_velocity = _entry("joint_velocity", "(n, joints) [rad/s].")
+actions = _entry("actions", "(n, actions) the last ones.")
 
 
 def default_observations() -> dict[str, ObservationTerm]:
