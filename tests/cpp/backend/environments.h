@@ -12,6 +12,12 @@ namespace environments {
 
 using namespace bodies;
 
+constexpr Precision kPrecisions[] = {Precision::kFloat32, Precision::kFloat64};
+
+inline const char* name(Integrator integrator) {
+  return integrator == Integrator::kEnergySafe ? "energy_safe" : "semi_implicit";
+}
+
 /// Numbers of one environment: T must be the type of the field.
 template <class T>
 std::span<T> row(const BatchArray& array, int env) {
