@@ -3,8 +3,9 @@
 // impulse found, its residual, and whether it is good enough.
 //
 // Rule between sweeps and Newton steps, per lane: with e_k the largest velocity change of sweep k,
-// sweep again while e_k^2 / e_(k-1) <= tolerance (the next sweep is then expected to converge),
-// else take a Newton step. Maximum dissipation ([Hwangbo 2018] eq. 8) is not a complementarity
+// e_k^2 / e_(k-1) is what the next one is expected to change. Within the tolerance, that one is not
+// taken; the certificate says if it should have been, and the lane goes on. Else a Newton step.
+// Maximum dissipation ([Hwangbo 2018] eq. 8) is not a complementarity
 // problem in the velocity, so the Newton finish and the fallback do not apply: it sweeps to the
 // end, and its residual is |G_ii (lambda_i - local_i)|.
 #pragma once
@@ -117,25 +118,32 @@ STICKSLIP_STAGE S certify(FactoredProblem<S>& p) {
   }
 }
 
-/// Sweeps and Newton steps until the change is small in every lane of `live`, or the cap.
+/// Sweeps and Newton steps until in every lane of `live` the change is small or, with `foresee`,
+/// that of the next sweep is expected to be; or the cap.
 template <int M, bool kMaxDissipation, class S>
-STICKSLIP_INLINE void iterate(FactoredProblem<S>& p, Mask<S> live, S tolerance_squared,
-                              const FactoredOptions& o, FactoredInfo<S>& info) {
+STICKSLIP_STAGE void iterate(FactoredProblem<S>& p, Mask<S> live, S tolerance_squared, bool foresee,
+                             const FactoredOptions& o, FactoredInfo<S>& info) {
   const S speed = constant<S>(0.1) * sqrt(tolerance_squared);
   S before = constant<S>(1e30);
+  Mask<S> only_swept = live;  // between the last two sweeps
   const int cap = kMaxDissipation ? 100 * o.max_sweeps : o.max_sweeps;
   for (int k = 1;; ++k) {
     const S change = sweep<M, kMaxDissipation>(p, live, speed);
-    live = live & (change > tolerance_squared);
     ++info.sweeps;
+    live = live & (change > tolerance_squared);
+    auto slow = live;
+    if (!kMaxDissipation && k >= 2) {
+      slow = live & (change * change > tolerance_squared * before);
+      if (foresee) live = live & (slow | !only_swept);
+    }
     if (!any(live) || k >= cap) return;
     if (!kMaxDissipation && k >= 2) {
-      const bool late = k >= 5;
-      const auto slow = late ? live : live & (change * change > tolerance_squared * before);
+      if (k >= 5) slow = live;
       if (any(slow)) {
         newton_step<M>(p, slow, constant<S>(k < o.late ? o.alpha : o.alpha_late));
         ++info.newton_steps;
       }
+      only_swept = !slow;
     }
     before = change;
   }
@@ -231,7 +239,7 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
       min(madd(relative * relative, fastest, absolute * absolute), allowed * allowed);
   // False for NaN, and where products of block entries would overflow.
   const auto finite = sum < constant<S>(sizeof(Value<S>) == 4 ? 1e14 : 1e30);
-  iterate<M, kMaxDissipation>(p, finite, tolerance_squared, o, info);
+  iterate<M, kMaxDissipation>(p, finite, tolerance_squared, true, o, info);
   // Which of the lanes are not solved. The residuals of others stay: float would evaluate them anew
   // without double's help.
   S worst = zero;
@@ -245,6 +253,10 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
     return bad;
   };
   auto bad = unsolved(finite);
+  if (any(bad) && !kMaxDissipation) {
+    iterate<M, kMaxDissipation>(p, bad, tolerance_squared, false, o, info);
+    bad = unsolved(bad);
+  }
   if (any(bad) && !kMaxDissipation && o.fallback) {
     run_fallback<M>(p, bad, allowed * constant<S>(0.9), info);
     bad = unsolved(bad);

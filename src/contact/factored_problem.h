@@ -190,17 +190,20 @@ class FactoredProblem {
       identity_ = identity_ && odd_[k] == (k & 1);
     }
   }
-  /// Adds a contact that touches all shared dofs, without private part, offset, or warm start;
-  /// returns its number.
+  /// Adds a contact that touches all shared dofs; its number. The caller sets what else it is.
+  int append() {
+    contacts_[n_].count = -1;
+    return n_++;
+  }
+  /// The same, without private part, offset or warm start.
   int add() {
-    FactoredContact<S>& c = contacts_[n_];
+    FactoredContact<S>& c = contacts_[append()];
     const S zero = constant<S>(0);
     c.friction = zero;
     for (S& x : c.private_block) x = zero;
     for (int r = 0; r < 3; ++r) c.offset[r] = c.impulse[r] = zero;
     c.active = !(zero < zero);
-    c.count = -1;
-    return n_++;
+    return n_ - 1;
   }
   /// The contact touches only these shared dofs (ascending); its rows are then y(i)[k] at dof
   /// index[k].

@@ -35,6 +35,9 @@ struct Bundle {
 
 struct Slot {
   bool prismatic;
+  /// Where every lane's LinkConstants::rotation only renames axes: its column k is the parent's
+  /// axis (k + renaming) % 3. Else -1.
+  int renaming;
   int joint[kMaxLanes];  // joint index of each lane
   LinkIndex parent[kMaxLanes];
 };

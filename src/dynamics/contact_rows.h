@@ -15,38 +15,76 @@ struct ContactRows {
   Row3<S>* base;    // columns of the base (6), order of u
 };
 
+/// Unit test forces at a contact point, one per row, on their way to the base: moments about the
+/// base origin and forces, by columns.
+template <class S>
+struct TestForces {
+  Row3<S> ang[3], lin[3];
+};
+
+/// Passes a joint; returns its column of Y. On a force f: z = s . f / sqrt(D), f <- f - U z.
+template <class S>
+STICKSLIP_INLINE Row3<S> pass_joint(const LinkState<Wide<S>>& joint, int lane, TestForces<S>& f) {
+  const auto at = [&](const Wide<S>& w) { return lane_of<S>(w, lane); };
+  const Spatial<Wide<S>>&s = joint.axis, &u = joint.arm;
+  const Row3<S> turn =
+      madd(f.ang[2], at(s.ang.z), madd(f.ang[1], at(s.ang.y), f.ang[0] * at(s.ang.x)));
+  const Row3<S> slide =
+      madd(f.lin[2], at(s.lin.z), madd(f.lin[1], at(s.lin.y), f.lin[0] * at(s.lin.x)));
+  const Row3<S> z = (turn + slide) * at(joint.inv_root);
+  f.lin[0] = nmadd(z, at(u.lin.x), f.lin[0]);
+  f.lin[1] = nmadd(z, at(u.lin.y), f.lin[1]);
+  f.lin[2] = nmadd(z, at(u.lin.z), f.lin[2]);
+  f.ang[0] = nmadd(z, at(u.ang.x), f.ang[0]);
+  f.ang[1] = nmadd(z, at(u.ang.y), f.ang[1]);
+  f.ang[2] = nmadd(z, at(u.ang.z), f.ang[2]);
+  return z;
+}
+
+/// The same for the first joint, where the forces of a pack are unit vectors at the point: the
+/// products with their zeros and ones are left out.
+template <class S>
+STICKSLIP_INLINE Row3<S> pass_first_joint(const LinkState<Wide<S>>& joint, int lane,
+                                          const Vec3<S>& point, TestForces<S>& f) {
+  if constexpr (ScalarTraits<S>::kWidth == 1) {
+    return pass_joint<S>(joint, lane, f);
+  } else {
+    const S one = constant<S>(1), &k = joint.inv_root;
+    const Vec3<S>&a = joint.axis.ang, &l = joint.axis.lin, &n = joint.arm.ang, &u = joint.arm.lin,
+          &p = point;
+    const S x = (nmadd(p.y, a.z, p.z * a.y) + l.x) * k,
+            y = (madd(p.x, a.z, -(p.z * a.x)) + l.y) * k,
+            z = (nmadd(p.x, a.y, p.y * a.x) + l.z) * k;
+    f.lin[0] = {nmadd(x, u.x, one), -(y * u.x), -(z * u.x)};
+    f.lin[1] = {-(x * u.y), nmadd(y, u.y, one), -(z * u.y)};
+    f.lin[2] = {-(x * u.z), -(y * u.z), nmadd(z, u.z, one)};
+    f.ang[0] = {-(x * n.x), -madd(y, n.x, p.z), nmadd(z, n.x, p.y)};
+    f.ang[1] = {nmadd(x, n.y, p.z), -(y * n.y), -madd(z, n.y, p.x)};
+    f.ang[2] = {-madd(x, n.z, p.y), nmadd(y, n.z, p.x), -(z * n.z)};
+    return {x, y, z};
+  }
+}
+
 /// `point` relative to the base origin; contact axes along the world's.
 template <class S>
 void compute_contact_rows(const Tree<S>& t, LinkIndex link, const Vec3<S>& point,
                           ContactRows<S>& rows) {
   const S o = constant<S>(0), one = constant<S>(1);
-  // Unit test forces at the point, one per row: [0..2] force, [3..5] moment about the base origin.
-  Row3<S> f[6] = {make_row3(one, o, o),
-                  make_row3(o, one, o),
-                  make_row3(o, o, one),
-                  make_row3(o, -point.z, point.y),
-                  make_row3(point.z, o, -point.x),
-                  make_row3(-point.y, point.x, o)};
+  TestForces<S> f = {{make_row3(o, -point.z, point.y), make_row3(point.z, o, -point.x),
+                      make_row3(-point.y, point.x, o)},
+                     {make_row3(one, o, o), make_row3(o, one, o), make_row3(o, o, one)}};
   rows.depth = 0;
-  while (link.slot != kBaseSlot) {
-    const auto& state = t.links[link.slot];
-    const auto at = [&](const Wide<S>& w) { return lane_of<S>(w, link.lane); };
-    const Spatial<Wide<S>>&s = state.axis, &u = state.arm;
-    const Row3<S> turn = madd(f[5], at(s.ang.z), madd(f[4], at(s.ang.y), f[3] * at(s.ang.x)));
-    const Row3<S> slide = madd(f[2], at(s.lin.z), madd(f[1], at(s.lin.y), f[0] * at(s.lin.x)));
-    const Row3<S> z = (turn + slide) * at(state.inv_root);
-    f[0] = nmadd(z, at(u.lin.x), f[0]);
-    f[1] = nmadd(z, at(u.lin.y), f[1]);
-    f[2] = nmadd(z, at(u.lin.z), f[2]);
-    f[3] = nmadd(z, at(u.ang.x), f[3]);
-    f[4] = nmadd(z, at(u.ang.y), f[4]);
-    f[5] = nmadd(z, at(u.ang.z), f[5]);
+  const auto put = [&](const Row3<S>& z) STICKSLIP_LAMBDA {
     rows.path[rows.depth] = link;
-    rows.joint[rows.depth++] = z;
+    store(z, rows.joint[rows.depth++]);
     link = t.slots[link.slot].parent[link.lane];
-  }
-  if (t.floating) solve_base_transposed(t.base, f);
-  for (int k = 0; k < 6; ++k) rows.base[k] = f[k];
+  };
+  if (link.slot != kBaseSlot) put(pass_first_joint(t.links[link.slot], link.lane, point, f));
+  while (link.slot != kBaseSlot) put(pass_joint<S>(t.links[link.slot], link.lane, f));
+  Row3<S> base[6] = {f.lin[0], f.lin[1], f.lin[2], f.ang[0], f.ang[1], f.ang[2]};
+  if (t.floating) solve_base_transposed(t.base, base);
+#pragma GCC unroll 6
+  for (int k = 0; k < 6; ++k) store(base[k], rows.base[k]);
 }
 
 /// One row Y = J L^-1: the unit force `axis` at `point`. Calls put_joint(link, entry) for the

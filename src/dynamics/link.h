@@ -6,14 +6,24 @@
 
 namespace stickslip::dynamics::inline STICKSLIP_KERNELS {
 
+/// r times the rotation of a joint at q = 0: most often that only renames axes.
+template <class W, class K>
+STICKSLIP_INLINE Mat3<W> joint_rotation(const Mat3<W>& r, const K constant[9], int renaming) {
+  const W* m = r.m;
+  if (renaming == 0) return r;
+  if (renaming == 1) return {{m[1], m[2], m[0], m[4], m[5], m[3], m[7], m[8], m[6]}};
+  if (renaming == 2) return {{m[2], m[0], m[1], m[5], m[3], m[4], m[8], m[6], m[7]}};
+  return r * wide_mat3<W>(constant);
+}
+
 /// (D3): the pose of the parent becomes that of the link. Returns the joint's motion s (D4).
 template <class W, class K>
-STICKSLIP_INLINE Spatial<W> move_to_link(const LinkConstants<K>& c, bool prismatic, W q, Mat3<W>& r,
-                                         Vec3<W>& p) {
+STICKSLIP_INLINE Spatial<W> move_to_link(const LinkConstants<K>& c, const Slot& slot, W q,
+                                         Mat3<W>& r, Vec3<W>& p) {
   p = madd(r, wide3<W>(c.position), p);
-  r = r * wide_mat3<W>(c.rotation);
+  r = joint_rotation(r, c.rotation, slot.renaming);
   const Vec3<W> axis{r.m[2], r.m[5], r.m[8]};
-  if (prismatic) {
+  if (slot.prismatic) {
     p = madd(axis, q, p);
     return {zero3<W>(), axis};
   }

@@ -9,11 +9,12 @@
 namespace stickslip::dynamics {
 namespace {
 
-/// A rotation whose third column is the axis. Coordinate axes give exact permutations.
+/// A rotation whose third column is the axis. Coordinate axes give exact cyclic permutations.
 Matrix3 turn_onto_z(const Vector3& axis) {
-  int smallest = 0;
-  for (int i = 1; i < 3; ++i)
-    if (std::abs(axis[i]) < std::abs(axis[smallest])) smallest = i;
+  const auto size = [&](int i) { return std::abs(axis[i]); };
+  const int largest = size(2) > std::max(size(0), size(1)) ? 2 : size(1) > size(0) ? 1 : 0;
+  const int next = (largest + 1) % 3, other = (largest + 2) % 3;
+  const int smallest = size(other) < size(next) ? other : next;
   Vector3 x{};
   const double along = axis[smallest];
   for (int i = 0; i < 3; ++i) x[i] = (i == smallest ? 1.0 : 0.0) - along * axis[i];
@@ -22,6 +23,17 @@ Matrix3 turn_onto_z(const Vector3& axis) {
   const Vector3 y{axis[1] * x[2] - axis[2] * x[1], axis[2] * x[0] - axis[0] * x[2],
                   axis[0] * x[1] - axis[1] * x[0]};
   return {x[0], y[0], axis[0], x[1], y[1], axis[1], x[2], y[2], axis[2]};
+}
+
+/// Slot::renaming of one lane.
+int find_renaming(const Matrix3& r) {
+  for (int by = 0; by < 3; ++by) {
+    bool all = true;
+    for (int row = 0; row < 3; ++row)
+      for (int k = 0; k < 3; ++k) all = all && r[3 * row + k] == (row == (k + by) % 3);
+    if (all) return by;
+  }
+  return -1;
 }
 
 /// A maximal serial chain of joints.
@@ -104,7 +116,7 @@ TreeLayout::TreeLayout(const Model& model, int lanes_per_bundle)
     }
 
   links.resize(static_cast<size_t>(num_slots) * kMaxLanes);
-  for (int slot = 0; slot < num_slots; ++slot)
+  for (int slot = 0; slot < num_slots; ++slot) {
     for (int lane = 0; lane < kMaxLanes; ++lane) {
       const int j = slots[slot].joint[lane];
       const Joint& joint = model.joints()[j];
@@ -116,7 +128,10 @@ TreeLayout::TreeLayout(const Model& model, int lanes_per_bundle)
       std::copy(r.begin(), r.end(), link.rotation);
       std::copy(p.begin(), p.end(), link.position);
       link.inertial = turned_inertia(j + 1, in);
+      int& renaming = slots[slot].renaming;
+      renaming = lane == 0 || renaming == find_renaming(r) ? find_renaming(r) : -1;
     }
+  }
 }
 
 Vector3 TreeLayout::turned(int body, const Vector3& p) const {

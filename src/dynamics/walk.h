@@ -70,8 +70,7 @@ void chain_positions(Tree<S>& t, const Bundle& b, const S* joints) {
   for (int slot = b.first_slot; slot < b.first_slot + b.length; ++slot) {
     LinkState<W>& link = t.links[slot];
     const Slot& s = t.slots[slot];
-    store(move_to_link(t.constants[slot], s.prismatic, load_lanes(joints, s.joint), r, p),
-          link.axis);
+    store(move_to_link(t.constants[slot], s, load_lanes(joints, s.joint), r, p), link.axis);
     store(r, link.rotation);
     store(p, link.position);
   }

@@ -33,6 +33,15 @@ STICKSLIP_INLINE void store(const Row3<S>& a, S out[3]) {
     out[0] = a.x, out[1] = a.y, out[2] = a.z;
   }
 }
+/// to = a, number by number: GCC 12 holds in memory what is copied whole.
+template <class S>
+STICKSLIP_INLINE void store(const Row3<S>& a, Row3<S>& to) {
+  if constexpr (ScalarTraits<S>::kWidth == 1) {
+    to.v = a.v;
+  } else {
+    to.x = a.x, to.y = a.y, to.z = a.z;
+  }
+}
 template <class S>
 STICKSLIP_INLINE Row3<S> operator*(const Row3<S>& a, S b) {
   if constexpr (ScalarTraits<S>::kWidth == 1)
@@ -56,7 +65,10 @@ STICKSLIP_INLINE Row3<S> madd(const Row3<S>& a, S b, const Row3<S>& c) {  // a *
 }
 template <class S>
 STICKSLIP_INLINE Row3<S> nmadd(const Row3<S>& a, S b, const Row3<S>& c) {  // c - a * b
-  return madd(a, -b, c);
+  if constexpr (ScalarTraits<S>::kWidth == 1)
+    return {nmadd(a.v, Pack<S, 4>(b), c.v)};
+  else
+    return {nmadd(a.x, b, c.x), nmadd(a.y, b, c.y), nmadd(a.z, b, c.z)};
 }
 
 }  // namespace stickslip::inline STICKSLIP_KERNELS

@@ -82,13 +82,29 @@ STICKSLIP_INLINE RigidInertia<S> at_reference(const BodyInertia<S>& i) {
            i.rot.yy + (xx + zz), nmadd(hy, c.z, i.rot.yz), i.rot.zz + (xx + yy)}};
 }
 /// Force that gives a body with angular velocity w the angular acceleration a.ang, and its point at
-/// the reference the acceleration a.lin. The moment uses the force as it was rounded, so that the
-/// error of a large centripetal force has no lever to a joint through the center of mass.
+/// the reference the acceleration a.lin. Every product is one of w w^T, which center and moment
+/// share. The moment uses the force as it was rounded, so that the error of a large centripetal
+/// force has no lever to a joint through the center of mass.
 template <class S>
 STICKSLIP_INLINE Spatial<S> inertial_force(const BodyInertia<S>& i, const Vec3<S>& w,
                                            const Spatial<S>& a) {
-  const Vec3<S> f = cross(w, cross(w, i.com), cross(a.ang, i.com, a.lin)) * i.mass;
-  return {cross(w, i.rot * w, madd(i.rot, a.ang, cross(i.com, f))), f};
+  const Vec3<S>& e = a.ang;
+  const Sym3<S>& j = i.rot;
+  const S xx = w.x * w.x, yy = w.y * w.y, zz = w.z * w.z;
+  const S xy = w.x * w.y, xz = w.x * w.z, yz = w.y * w.z;
+  // Acceleration of a point r: a.lin + A r, A = [e]x + w w^T - |w|^2 1.
+  const Mat3<S> m{{-(yy + zz), xy - e.z, xz + e.y, xy + e.z, -(xx + zz), yz - e.x, xz - e.y,
+                   yz + e.x, -(xx + yy)}};
+  // J e + w x J w
+  const Vec3<S> moment{
+      nmadd(j.xy, m.m[6],
+            madd(j.xz, m.m[3], madd(j.yz, yy - zz, madd(j.zz - j.yy, yz, j.xx * e.x)))),
+      nmadd(j.yz, m.m[1],
+            madd(j.xy, m.m[7], madd(j.xz, zz - xx, madd(j.xx - j.zz, xz, j.yy * e.y)))),
+      nmadd(j.xz, m.m[5],
+            madd(j.yz, m.m[2], madd(j.xy, xx - yy, madd(j.yy - j.xx, xy, j.zz * e.z))))};
+  const Vec3<S> f = madd(m, i.com, a.lin) * i.mass;
+  return {cross(i.com, f, moment), f};
 }
 
 /// Articulated-body inertia: (moment; force) = [aa al; al^T ll] (angular; linear) [Featherstone

@@ -271,7 +271,7 @@ class BlockSum {
 template <class S>
 void ContactStage<S>::fill_contact(const dynamics::Tree<S>& tree, const ActiveContact<S>& a,
                                    const S* friction, bool with_x) {
-  const int base_dofs = tables_->floating ? 6 : 0, c = problem_.add();
+  const int base_dofs = tables_->floating ? 6 : 0, c = problem_.append();
   Row3<S>* y = problem_.y(c);  // of the base already
   for (int k = 0; k < base_dofs; ++k) index_[k] = k;
   int touched = base_dofs;
@@ -334,7 +334,10 @@ void ContactStage<S>::solve(const StepSettings& settings, Mask<S> live, S* warm,
       solve_by_chain(settings.host, open, o.residual_tolerance, found.allowed, info);
   }
   info.contacts = count_;
-  for (int k = 0; k < 3 * tables_->num_points; ++k) warm[k] = select(live, zero, warm[k]);
+  if (all(live))
+    for (int k = 0; k < 3 * tables_->num_points; ++k) warm[k] = zero;
+  else
+    for (int k = 0; k < 3 * tables_->num_points; ++k) warm[k] = select(live, zero, warm[k]);
   for (int i = 0; i < count_; ++i)
     for (int r = 0; r < 3; ++r) {
       S &impulse = problem_.impulse(i)[r], &w = warm[3 * active_[i].id + r];

@@ -31,7 +31,7 @@ def policy(example: dict[str, Any]) -> Any:
 
 
 def test_the_policy_beside_it_walks_at_commanded_speeds_without_falls(example: dict[str, Any], policy: Any) -> None:
-    result = example["evaluate"](policy, example["make_task"](100, "NextStep", noise=False), seed=5)
+    result = example["evaluate"](policy, example["make_task"](500, "NextStep", noise=False), seed=5)
     assert result["velocity_error"] < 0.25 and result["yaw_error"] < 0.25 and result["fallen"] <= 0.05, result
 
 

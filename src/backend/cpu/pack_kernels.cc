@@ -40,6 +40,7 @@ static StatusBits step_pack(void* workspace, const EnvArrays& arrays, const Pack
   lanes.load(arrays, first, num_envs);
   lanes.use_inertias(inertias);
   for (int k = 0; k < steps; ++k) {
+    lanes.keep_contacts(k + 1 == steps);
     if (settings.energy_safe)
       step::step_energy_safe(lanes.robot(), settings);
     else

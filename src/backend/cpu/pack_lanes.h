@@ -22,6 +22,10 @@ class PackLanes {
   /// num_envs repeat the last environment.
   void load(const EnvArrays& arrays, long first, long num_envs);
   void use_inertias(const PackInertias& inertias);
+  /// Before each step of the robot: whether `store` will ask for its contacts.
+  void keep_contacts(bool keep) {
+    robot_.last_contacts = keep ? contacts_ : step::LaneContacts<S>{};
+  }
   /// After each step of the robot.
   void count_step();
   /// Status bits of the environments below num_envs, or-ed.
@@ -52,6 +56,7 @@ class PackLanes {
   S *last_q_, *last_u_, *scratch_;
   Spatial<dynamics::Wide<S>>* wrenches_;
   Spatial<S> base_wrench_;
+  step::LaneContacts<S> contacts_;
   Mask<S> set_aside_, fresh_, unconverged_, non_finite_;
   S residual_, steps_failed_;
   long steps_ = 0;
@@ -78,7 +83,7 @@ void PackLanes<S>::lay_out(contact::Arena& arena, const PackScene& scene) {
   last_u_ = arena.take<S>(t.nu);
   wrenches_ = arena.take<Spatial<dynamics::Wide<S>>>(t.num_slots);
   scratch_ = arena.take<S>(6 * t.num_bodies);
-  robot_.last_contacts = {arena.take<S>(3 * t.num_points), arena.take<Mask<S>>(t.num_points)};
+  contacts_ = {arena.take<S>(3 * t.num_points), arena.take<Mask<S>>(t.num_points)};
   step::LaneControl<S>& c = robot_.control;
   c = {force_,  kp_,        kd_,  target_, friction_,       nullptr,
        nullptr, zero3<S>(), true, false,   step::none<S>(), step::none<S>()};
@@ -300,12 +305,12 @@ StatusBits PackLanes<S>::store(const EnvArrays& arrays, const step::StepSettings
   past[h.fresh] = select(s.fresh, one, zero);
   past[h.aside] = select(set_aside_, one, zero);
 
-  const step::LaneContacts<S>& last = robot_.last_contacts;
-  store_rows(last.impulse, 3 * t.num_points, rows(arrays.contact_impulse, 3 * t.num_points, first));
+  store_rows(contacts_.impulse, 3 * t.num_points,
+             rows(arrays.contact_impulse, 3 * t.num_points, first));
   Flag* active = arrays.contact_active + first * t.num_points;
   for (int k = 0; k < t.num_points; ++k)
     for (int lane = 0; lane < kWidth; ++lane)
-      active[long(lane) * t.num_points + k] = get_lane(last.active[k], lane);
+      active[long(lane) * t.num_points + k] = get_lane(contacts_.active[k], lane);
 
   const Mask<S> non_finite = non_finite_ | set_aside_, unconverged = unconverged_ & !set_aside_;
   StatusBits bits = 0;
