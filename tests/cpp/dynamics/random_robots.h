@@ -64,6 +64,30 @@ inline ModelPtr random_robot(unsigned seed, int joints, int legs, BaseType base)
   return random_tree(seed, parents, legs == 0, base);
 }
 
+/// Four legs of four joints along coordinate axes, frames parallel at zero, as most robots are
+/// described. Alike, or every other leg with its axes in another order.
+inline ModelPtr aligned_legs(unsigned seed, bool alike) {
+  std::mt19937 rng(seed);
+  std::uniform_real_distribution<double> u(-1, 1);
+  ModelBuilder builder("aligned");
+  builder.add_link("trunk", random_inertial(rng));
+  for (int leg = 0; leg < 4; ++leg) {
+    std::string parent = "trunk";
+    for (int k = 0; k < 4; ++k) {
+      const std::string id = std::to_string(10 * leg + k);
+      builder.add_link("link" + id, random_inertial(rng));
+      LinkJoint joint;
+      joint.name = "joint" + id, joint.parent = parent, joint.child = parent = "link" + id;
+      joint.type = LinkJointType::kRevolute;
+      for (double& p : joint.pose.position) p = 0.3 * u(rng);
+      joint.axis = {0, 0, 0};
+      joint.axis[k * k * (alike ? 1 : 1 + leg % 2) % 3] = 1;  // x y y x or x z z x
+      builder.add_joint(joint);
+    }
+  }
+  return builder.build(BaseType::kFloating);
+}
+
 /// A humanoid's topology: two legs of 6 joints, a trunk of 3, on it two arms of 7 and a head of 2.
 inline ModelPtr random_humanoid(unsigned seed) {
   std::vector<int> parents;

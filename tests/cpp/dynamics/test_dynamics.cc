@@ -106,7 +106,8 @@ std::vector<ModelPtr> robots() {
           random_robot(3, 15, 0, BaseType::kFloating), random_robot(4, 7, 1, BaseType::kFixed),
           random_robot(5, 20, 0, BaseType::kFixed), random_robot(6, 30, 0, BaseType::kFloating),
           random_robot(7, 1, 1, BaseType::kFixed), random_robot(8, 18, 6, BaseType::kFloating),
-          testing::random_humanoid(9),
+          testing::random_humanoid(9), testing::aligned_legs(11, true),
+          testing::aligned_legs(12, false),
           // Equal chains of which one carries others; chains of every length around a block.
           testing::random_tree(10, {-1, 0, -1, 2, 1, 4, 1, 6, 7, -1, 9, -1, 11, 12, 13, 14}, true,
                                BaseType::kFloating)};
@@ -216,6 +217,31 @@ void compare_inertias() {
   }
 }
 
+/// Rotations that only rename axes, against the product with them.
+template <class S>
+void compare_renamings() {
+  for (const bool alike : {true, false}) {
+    const ModelPtr model = testing::aligned_legs(4, alike);
+    const std::vector<std::vector<double>> states(ScalarTraits<S>::kWidth,
+                                                  random_state(*model, 31));
+    Robots<S> renamed(*model, states), multiplied(*model, states);
+    std::vector<Slot> slots(multiplied.t.slots, multiplied.t.slots + multiplied.t.num_slots);
+    int count[3] = {};
+    for (Slot& slot : slots) {
+      if (slot.renaming >= 0) ++count[slot.renaming];
+      slot.renaming = -1;
+    }
+    multiplied.t.slots = slots.data();
+    compute_free_motion(renamed.t, renamed.input());
+    compute_free_motion(multiplied.t, multiplied.input());
+    CHECK(numbers(renamed, true) == numbers(multiplied, true));
+    if (Tree<S>::kLanes == 1 || alike)
+      for (const int n : count) CHECK(n > 0);
+    else  // lanes of two kinds: only where both rename in the same way
+      CHECK(count[0] + count[1] + count[2] == 2);
+  }
+}
+
 template <class Pack>
 void compare_lanes_with_double() {
   for (const ModelPtr& model : robots()) {
@@ -253,6 +279,13 @@ TEST(FusedPassesEqualSeparateOnesBitForBit) {
   compare_fused<Pack<double, 8>>();
   compare_fused<Pack<float, 8>>();
   compare_fused<Pack<float, 16>>();
+}
+
+TEST(RenamingAxesEqualsMultiplyingWithTheRotationThatDoes) {
+  compare_renamings<double>();
+  compare_renamings<float>();
+  compare_renamings<Pack<double, 8>>();
+  compare_renamings<Pack<float, 16>>();
 }
 
 TEST(InertiasPerEnvironmentEqualThoseOfAModelThatHasThem) {
