@@ -3,11 +3,11 @@
 // impulse found, its residual, and whether it is good enough.
 //
 // Rule between sweeps and Newton steps, per lane: with e_k the largest velocity change of sweep k,
-// e_k^2 / e_(k-1) is what the next one is expected to change. Within the tolerance, that one is not
-// taken; the certificate says if it should have been, and the lane goes on. Else a Newton step.
-// Maximum dissipation ([Hwangbo 2018] eq. 8) is not a complementarity
-// problem in the velocity, so the Newton finish and the fallback do not apply: it sweeps to the
-// end, and its residual is |G_ii (lambda_i - local_i)|.
+// e_k^2 / e_(k-1) is what the next one is expected to change. Above the tolerance, take a Newton
+// step. Within it, double stops: the certificate says if it should not have, and the lane goes on.
+// Maximum dissipation ([Hwangbo 2018] eq. 8) is not a complementarity problem in the velocity, so
+// the Newton finish and the fallback do not apply: it sweeps to the end, and its residual is
+// |G_ii (lambda_i - local_i)|.
 #pragma once
 #include "contact/jam.h"
 #include "contact/one_lane.h"
