@@ -34,7 +34,8 @@ inline double largest(std::span<const double> a) {
   return worst;
 }
 inline bool same_bits(std::span<const double> a, std::span<const double> b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
+  if (a.size() != b.size()) return false;
+  return a.empty() || std::memcmp(a.data(), b.data(), a.size_bytes()) == 0;
 }
 
 /// Random numbers of splitmix64: integers and one division, no library distribution.
