@@ -3,11 +3,12 @@
 // impulse found, its residual, and whether it is good enough.
 //
 // Rule between sweeps and Newton steps, per lane: with e_k the largest velocity change of sweep k,
-// e_k^2 / e_(k-1) is what the next one is expected to change. Above the tolerance, take a Newton
-// step. Within it, double stops: the certificate says if it should not have, and the lane goes on.
-// Maximum dissipation ([Hwangbo 2018] eq. 8) is not a complementarity problem in the velocity, so
-// the Newton finish and the fallback do not apply: it sweeps to the end, and its residual is
-// |G_ii (lambda_i - local_i)|.
+// e_k^2 / e_(k-1) is what the next one is expected to change. Where that is above the tolerance,
+// and always from the fifth sweep on, a Newton step comes before the next sweep; else it is swept
+// again. Or, with `foresee`, not at all, if no Newton step lay between the last two sweeps: the
+// lane stops, and goes on only if the certificate says that it should have. Maximum dissipation
+// ([Hwangbo 2018] eq. 8) is not a complementarity problem in the velocity, so the Newton finish and
+// the fallback do not apply: it sweeps to the end, and its residual is |G_ii (lambda_i - local_i)|.
 #pragma once
 #include "contact/jam.h"
 #include "contact/one_lane.h"
@@ -25,6 +26,9 @@ struct FactoredOptions {
   double alpha_late = 1e-5;  ///< ... from this sweep on
   int late = 8;
   int max_sweeps = 16;  ///< before the fallback; maximum dissipation takes up to 100 times as many
+  /// Leaves out a sweep that is expected to change less than the tolerance. For tolerances that the
+  /// certificate can vouch for, with residual_tolerance.
+  bool foresee = true;
   bool fallback = true;
 };
 
@@ -36,6 +40,8 @@ FactoredOptions default_options() {
     o.tolerance_absolute = 1e-6;
     o.tolerance_relative = 1e-5;
     o.residual_tolerance = 1e-5;
+    // It doubles the share of a humanoid's steps that double judges above 1e-5 m/s.
+    o.foresee = false;
     // With less weight, Newton steps chase the rounding of redundant contacts; with more, they
     // creep where robots hang and slide. What is not solved after twelve sweeps seldom is (measured
     // on the tasks of benchmarks/compare and benchmarks/micro/lane_kernels.cc).
@@ -53,8 +59,9 @@ struct FactoredInfo {
   S allowed;          // what it may be [m/s]
   Mask<S> converged;  // residual within tolerance; false where an input is not finite (then the
                       // impulses are zero)
-  int sweeps = 0;     // of the slowest lane
+  int sweeps = 0;     // passes over all contacts
   int newton_steps = 0;
+  int resumed = 0;    // solves that went on after a sweep was left out in vain
   int fallbacks = 0;  // lanes that needed it
   int fallback_steps = 0;
 };
@@ -119,13 +126,13 @@ STICKSLIP_STAGE S certify(FactoredProblem<S>& p) {
 }
 
 /// Sweeps and Newton steps until in every lane of `live` the change is small or, with `foresee`,
-/// that of the next sweep is expected to be; or the cap.
+/// that of the next sweep is expected to be; or the cap. Returns the lanes that stopped so.
 template <int M, bool kMaxDissipation, class S>
-STICKSLIP_STAGE void iterate(FactoredProblem<S>& p, Mask<S> live, S tolerance_squared, bool foresee,
-                             const FactoredOptions& o, FactoredInfo<S>& info) {
+STICKSLIP_STAGE Mask<S> iterate(FactoredProblem<S>& p, Mask<S> live, S tolerance_squared,
+                                bool foresee, const FactoredOptions& o, FactoredInfo<S>& info) {
   const S speed = constant<S>(0.1) * sqrt(tolerance_squared);
   S before = constant<S>(1e30);
-  Mask<S> only_swept = live;  // between the last two sweeps
+  Mask<S> only_swept = live, foreseen = live & !live;
   const int cap = kMaxDissipation ? 100 * o.max_sweeps : o.max_sweeps;
   for (int k = 1;; ++k) {
     const S change = sweep<M, kMaxDissipation>(p, live, speed);
@@ -134,9 +141,13 @@ STICKSLIP_STAGE void iterate(FactoredProblem<S>& p, Mask<S> live, S tolerance_sq
     auto slow = live;
     if (!kMaxDissipation && k >= 2) {
       slow = live & (change * change > tolerance_squared * before);
-      if (foresee) live = live & (slow | !only_swept);
+      if (foresee) {
+        const auto stops = live & only_swept & !slow;
+        foreseen = foreseen | stops;
+        live = live & !stops;
+      }
     }
-    if (!any(live) || k >= cap) return;
+    if (!any(live) || k >= cap) return foreseen;
     if (!kMaxDissipation && k >= 2) {
       if (k >= 5) slow = live;
       if (any(slow)) {
@@ -239,10 +250,8 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
       min(madd(relative * relative, fastest, absolute * absolute), allowed * allowed);
   // False for NaN, and where products of block entries would overflow.
   const auto finite = sum < constant<S>(sizeof(Value<S>) == 4 ? 1e14 : 1e30);
-  // In float the certificate errs too much to rely on: its 1e-5 m/s may be 1e-4 where robots stand
-  // on flat feet.
-  const bool foresee = sizeof(Value<S>) == 8;
-  iterate<M, kMaxDissipation>(p, finite, tolerance_squared, foresee, o, info);
+  const auto foreseen =
+      iterate<M, kMaxDissipation>(p, finite, tolerance_squared, o.foresee, o, info);
   // Which of the lanes are not solved. The residuals of others stay: float would evaluate them anew
   // without double's help.
   S worst = zero;
@@ -256,9 +265,10 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
     return bad;
   };
   auto bad = unsolved(finite);
-  if (any(bad) && foresee && !kMaxDissipation) {
-    iterate<M, kMaxDissipation>(p, bad, tolerance_squared, false, o, info);
-    bad = unsolved(bad);
+  if (const auto again = bad & foreseen; any(again)) {
+    iterate<M, kMaxDissipation>(p, again, tolerance_squared, false, o, info);
+    ++info.resumed;
+    bad = (bad & !again) | unsolved(again);
   }
   if (any(bad) && !kMaxDissipation && o.fallback) {
     run_fallback<M>(p, bad, allowed * constant<S>(0.9), info);

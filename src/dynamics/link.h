@@ -6,7 +6,7 @@
 
 namespace stickslip::dynamics::inline STICKSLIP_KERNELS {
 
-/// r times the rotation of a joint at q = 0: most often that only renames axes.
+/// r times the rotation of a joint at q = 0, which often only renames axes.
 template <class W, class K>
 STICKSLIP_INLINE Mat3<W> joint_rotation(const Mat3<W>& r, const K constant[9], int renaming) {
   const W* m = r.m;

@@ -9,7 +9,8 @@
 namespace stickslip::dynamics {
 namespace {
 
-/// A rotation whose third column is the axis. Coordinate axes give exact cyclic permutations.
+/// A rotation whose third column is the axis. Coordinate axes give exact permutations: positive
+/// ones cyclic, negative ones with signs.
 Matrix3 turn_onto_z(const Vector3& axis) {
   const auto size = [&](int i) { return std::abs(axis[i]); };
   const int largest = size(2) > std::max(size(0), size(1)) ? 2 : size(1) > size(0) ? 1 : 0;
@@ -128,8 +129,11 @@ TreeLayout::TreeLayout(const Model& model, int lanes_per_bundle)
       std::copy(r.begin(), r.end(), link.rotation);
       std::copy(p.begin(), p.end(), link.position);
       link.inertial = turned_inertia(j + 1, in);
-      int& renaming = slots[slot].renaming;
-      renaming = lane == 0 || renaming == find_renaming(r) ? find_renaming(r) : -1;
+      const int renaming = find_renaming(r);
+      if (lane == 0)
+        slots[slot].renaming = renaming;
+      else if (renaming != slots[slot].renaming)
+        slots[slot].renaming = -1;
     }
   }
 }

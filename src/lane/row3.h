@@ -33,7 +33,7 @@ STICKSLIP_INLINE void store(const Row3<S>& a, S out[3]) {
     out[0] = a.x, out[1] = a.y, out[2] = a.z;
   }
 }
-/// to = a, number by number: GCC 12 holds in memory what is copied whole.
+/// to = a, number by number, as spatial/numbers.h does it and for its reason.
 template <class S>
 STICKSLIP_INLINE void store(const Row3<S>& a, Row3<S>& to) {
   if constexpr (ScalarTraits<S>::kWidth == 1) {

@@ -82,9 +82,9 @@ STICKSLIP_INLINE RigidInertia<S> at_reference(const BodyInertia<S>& i) {
            i.rot.yy + (xx + zz), nmadd(hy, c.z, i.rot.yz), i.rot.zz + (xx + yy)}};
 }
 /// Force that gives a body with angular velocity w the angular acceleration a.ang, and its point at
-/// the reference the acceleration a.lin. Every product is one of w w^T, which center and moment
-/// share. The moment uses the force as it was rounded, so that the error of a large centripetal
-/// force has no lever to a joint through the center of mass.
+/// the reference the acceleration a.lin. Velocities enter only through w w^T, which center and
+/// moment share. The moment uses the force as it was rounded, so that the error of a large
+/// centripetal force has no lever to a joint through the center of mass.
 template <class S>
 STICKSLIP_INLINE Spatial<S> inertial_force(const BodyInertia<S>& i, const Vec3<S>& w,
                                            const Spatial<S>& a) {

@@ -306,6 +306,9 @@ contact::FactoredOptions solver_options(const StepSettings& settings) {
   const bool single = sizeof(Value<S>) == 4;
   const auto at_least = [&](double floor, double x) { return single && x < floor ? floor : x; };
   o.max_dissipation = settings.max_dissipation;
+  // Below the defaults the certificate would not notice a sweep that is missing.
+  o.foresee = o.foresee && settings.tolerance >= o.tolerance_absolute &&
+              settings.relative_tolerance >= o.tolerance_relative;
   o.tolerance_absolute = at_least(o.tolerance_absolute, settings.tolerance);
   o.tolerance_relative = at_least(o.tolerance_relative, settings.relative_tolerance);
   return o;
@@ -334,10 +337,7 @@ void ContactStage<S>::solve(const StepSettings& settings, Mask<S> live, S* warm,
       solve_by_chain(settings.host, open, o.residual_tolerance, found.allowed, info);
   }
   info.contacts = count_;
-  if (all(live))
-    for (int k = 0; k < 3 * tables_->num_points; ++k) warm[k] = zero;
-  else
-    for (int k = 0; k < 3 * tables_->num_points; ++k) warm[k] = select(live, zero, warm[k]);
+  clear_where(live, 3 * tables_->num_points, warm);
   for (int i = 0; i < count_; ++i)
     for (int r = 0; r < 3; ++r) {
       S &impulse = problem_.impulse(i)[r], &w = warm[3 * active_[i].id + r];

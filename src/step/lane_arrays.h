@@ -13,6 +13,15 @@ template <class S>
 STICKSLIP_INLINE void copy_where(Mask<S> m, const S* from, int n, S* to) {
   for (int k = 0; k < n; ++k) to[k] = select(m, from[k], to[k]);
 }
+/// to <- 0 in the lanes of the mask.
+template <class S>
+STICKSLIP_INLINE void clear_where(Mask<S> m, int n, S* to) {
+  const S zero = constant<S>(0);
+  if (all(m))  // as most often: nothing has to be read
+    for (int k = 0; k < n; ++k) to[k] = zero;
+  else
+    for (int k = 0; k < n; ++k) to[k] = select(m, zero, to[k]);
+}
 template <class S>
 STICKSLIP_INLINE Mask<S> none() {
   const S o = constant<S>(0);

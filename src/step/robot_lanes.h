@@ -132,12 +132,8 @@ template <class S>
 void record_contacts(RobotLanes<S>& robot, Mask<S> lanes, bool cleared = false) {
   const LaneContacts<S>& last = robot.last_contacts;
   if (!last.impulse) return;
-  const S zero = constant<S>(0);
-  for (int k = 0; k < robot.tables->num_points; ++k) {
-    last.active[k] = last.active[k] & !lanes;
-    for (int r = 0; r < 3; ++r)
-      last.impulse[3 * k + r] = select(lanes, zero, last.impulse[3 * k + r]);
-  }
+  clear_where(lanes, 3 * robot.tables->num_points, last.impulse);
+  for (int k = 0; k < robot.tables->num_points; ++k) last.active[k] = last.active[k] & !lanes;
   for (int i = 0; i < robot.contacts.count() && !cleared; ++i) {
     const ActiveContact<S>& a = robot.contacts.active(i);
     const Mask<S> here = lanes & a.active;

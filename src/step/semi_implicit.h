@@ -78,7 +78,7 @@ void step_semi_implicit(RobotLanes<S>& robot, const StepSettings& settings) {
     contacts.add_impulses(t, everywhere);
     timer.end(kSolve);
   } else {
-    for (int k = 0; k < 3 * tables.num_points; ++k) s.impulse[k] = zero;
+    clear_where(everywhere, 3 * tables.num_points, s.impulse);
   }
 
   record_contacts(robot, everywhere);

@@ -72,6 +72,7 @@ def test_target_that_is_not_finite_flags_whoever_the_neighbors_are(integrator: s
         elif neighbor == "wrench":
             batch.external_wrench[1, 0, 2] = 1.0
         batch.step(20)
+        assert not batch.contact_active[0].any() and not batch.contact_impulse[0].any()
         outcomes.append((int(batch.status[0]), batch.q[0].tobytes(), batch.u[0].tobytes()))
     assert outcomes[0][0] == int(ss.StepStatus.NON_FINITE)
     assert all(outcome == outcomes[0] for outcome in outcomes)
@@ -82,8 +83,11 @@ def test_state_that_is_none_is_set_aside_for_the_whole_call() -> None:
     outcomes = []
     for num_envs in (1, 1024):
         batch = ss.Batch(anymal(), num_envs)
+        batch.step(600)
+        assert batch.contact_active[0].any()
         batch.q[0, 2] = np.nan
         assert ss.StepStatus.NON_FINITE in batch.step(600)
+        assert not batch.contact_active[0].any() and not batch.contact_impulse[0].any()
         outcomes.append((int(batch.status[0]), float(batch.time[0]), batch.q[0].tobytes()))
     assert outcomes[0] == outcomes[1]
     assert outcomes[0][0] == int(ss.StepStatus.NON_FINITE)

@@ -176,7 +176,7 @@ void PackLanes<S>::check_state() {
   const Mask<S> fresh = good & !same;
   s.fresh = s.fresh | fresh;
   s.pending_gravity = select(fresh, zero, s.pending_gravity);
-  for (int k = 0; k < 3 * t.num_points; ++k) s.impulse[k] = select(fresh, zero, s.impulse[k]);
+  step::clear_where(fresh, 3 * t.num_points, s.impulse);
   step::copy_where(fresh, s.q, t.nq, last_q_);
   step::copy_where(fresh, s.u, t.nu, last_u_);
 }

@@ -107,6 +107,32 @@ TEST(RobotProblemsAreSolvedTo1e8) {
   }
 }
 
+TEST(SweepsThatWouldChangeNothingAreForeseenAndResumedWhereTheyWould) {
+  // Each problem with and without foresight.
+  Owned<double> f;
+  long sweeps[2] = {}, fallbacks[2] = {}, resumed = 0;
+  for (int scene = 0; scene < kNumScenes; ++scene) {
+    Random rng(700 + scene);
+    for (int n = 0; n < 2000; ++n) {
+      const RobotProblem p = random_robot_problem(scene, rng);
+      for (const bool foresee : {false, true}) {
+        FactoredOptions o;
+        o.foresee = foresee;
+        fill(f.p, p, 0);
+        const auto info = solve_factored(f.p, o);
+        sweeps[foresee] += info.sweeps, fallbacks[foresee] += info.fallbacks;
+        resumed += info.resumed;
+        CHECK(foresee || info.resumed == 0);
+      }
+    }
+  }
+  std::printf("  sweeps %ld, foreseen %ld; resumed %ld; fallbacks %ld, foreseen %ld\n", sweeps[0],
+              sweeps[1], resumed, fallbacks[0], fallbacks[1]);
+  CHECK(sweeps[1] < sweeps[0]);
+  CHECK(resumed > 0);
+  CHECK(fallbacks[1] <= fallbacks[0] + fallbacks[0] / 10);
+}
+
 TEST(FactoredEqualsDenseSweeps) {
   Owned<double> f;
   for (int scene : {kStand, kImpact}) {

@@ -64,24 +64,28 @@ inline ModelPtr random_robot(unsigned seed, int joints, int legs, BaseType base)
   return random_tree(seed, parents, legs == 0, base);
 }
 
-/// Four legs of four joints along coordinate axes, frames parallel at zero, as most robots are
-/// described. Alike, or every other leg with its axes in another order.
+/// Four legs of seven joints along coordinate axes, frames parallel at zero, as many robots are
+/// described; the fifth prismatic, the last along a negative axis. Alike, or every other leg with
+/// some axes in another order, and one with a joint at an angle.
 inline ModelPtr aligned_legs(unsigned seed, bool alike) {
   std::mt19937 rng(seed);
   std::uniform_real_distribution<double> u(-1, 1);
   ModelBuilder builder("aligned");
   builder.add_link("trunk", random_inertial(rng));
   for (int leg = 0; leg < 4; ++leg) {
+    const bool other = !alike && leg % 2 == 1;
+    const int axes[] = {0, other ? 2 : 1, other ? 2 : 1, 0, 1, 2, 0};
     std::string parent = "trunk";
-    for (int k = 0; k < 4; ++k) {
-      const std::string id = std::to_string(10 * leg + k);
+    for (int k = 0; k < 7; ++k) {
+      const std::string id = std::to_string(100 + 10 * leg + k);
       builder.add_link("link" + id, random_inertial(rng));
       LinkJoint joint;
       joint.name = "joint" + id, joint.parent = parent, joint.child = parent = "link" + id;
-      joint.type = LinkJointType::kRevolute;
+      joint.type = k == 4 ? LinkJointType::kPrismatic : LinkJointType::kRevolute;
+      if (!alike && leg == 3 && k == 5) joint.pose.rotation = random_rotation(rng);
       for (double& p : joint.pose.position) p = 0.3 * u(rng);
       joint.axis = {0, 0, 0};
-      joint.axis[k * k * (alike ? 1 : 1 + leg % 2) % 3] = 1;  // x y y x or x z z x
+      joint.axis[axes[k]] = k == 6 ? -1 : 1;
       builder.add_joint(joint);
     }
   }
