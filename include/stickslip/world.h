@@ -40,7 +40,7 @@ struct StepSolverOptions {
   int max_sweeps = 100'000;          ///< kPerContact, kPgs
   double alpha = 1.0, alpha_min = 0.7,
          gamma = 0.99;     ///< kPerContact, kPgs (alpha only); see SolveOptions
-  bool warm_start = true;  ///< start at the impulses of the last step
+  bool warm_start = true;  ///< start where the impulses of the last two steps point
 };
 
 /// Options of a world; fixed once it is made.

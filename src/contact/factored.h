@@ -22,8 +22,9 @@ struct FactoredOptions {
   double residual_tolerance = 1e-8;  ///< converged: largest residual at most this [m/s]
   double residual_relative =
       0;  ///< ... plus this much of the largest free contact velocity (float needs it)
-  double alpha = 1e-6;       ///< proximal weight of a Newton step ...
-  double alpha_late = 1e-5;  ///< ... from this sweep on
+  double alpha = 1e-6;        ///< proximal weight of a first Newton step ...
+  double alpha_again = 1e-6;  ///< ... of those after another sweep ...
+  double alpha_late = 1e-5;   ///< ... and from this sweep on
   int late = 8;
   int max_sweeps = 16;  ///< before the fallback; maximum dissipation takes up to 100 times as many
   /// Leaves out a sweep that is expected to change less than the tolerance. For tolerances that the
@@ -46,6 +47,7 @@ FactoredOptions default_options() {
     // creep where robots hang and slide. What is not solved after twelve sweeps seldom is (measured
     // on the tasks of benchmarks/compare and benchmarks/micro/lane_kernels.cc).
     o.alpha = 5e-5;
+    o.alpha_again = 5e-4;
     o.alpha_late = 5e-3;
     o.late = 5;
     o.max_sweeps = 12;
@@ -151,7 +153,8 @@ STICKSLIP_STAGE Mask<S> iterate(FactoredProblem<S>& p, Mask<S> live, S tolerance
     if (!kMaxDissipation && k >= 2) {
       if (k >= 5) slow = live;
       if (any(slow)) {
-        newton_step<M>(p, slow, constant<S>(k < o.late ? o.alpha : o.alpha_late));
+        const double alpha = k >= o.late ? o.alpha_late : k > 2 ? o.alpha_again : o.alpha;
+        newton_step<M>(p, slow, constant<S>(alpha));
         ++info.newton_steps;
       }
       only_swept = !slow;

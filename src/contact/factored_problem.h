@@ -16,6 +16,7 @@
 // changes a bit of it (but the sign of a zero) against the problem of that lane alone, as long as
 // its own contacts and dofs come in the same order and its dofs lie in the same chains (`clear`).
 #pragma once
+#include "contact/coupling.h"
 #include "contact/residual.h"
 #include "lane/row3.h"
 
@@ -146,24 +147,6 @@ struct FactoredCapacity {
   int dofs = 0;
 };
 
-/// Bump allocation over a block that the owner hands over; with no block it only counts.
-class Arena {
- public:
-  explicit Arena(void* memory) : base_(static_cast<char*>(memory)) {}
-  template <class T>
-  T* take(long n) {
-    used_ = (used_ + 63) / 64 * 64;
-    T* p = reinterpret_cast<T*>(base_ + used_);
-    used_ += n * long(sizeof(T));
-    return base_ ? p : nullptr;
-  }
-  long used() const { return used_ + 64; }
-
- private:
-  char* base_;
-  long used_ = 0;
-};
-
 /// A factored problem and everything its solve needs. Memory is attached once; nothing allocates
 /// afterwards.
 template <class S>
@@ -184,6 +167,7 @@ class FactoredProblem {
     n_ = 0;
     m_ = m;
     identity_ = true;
+    coupled_ = false;
     for (int k = 0; k < padded(m); ++k) w0[k] = constant<S>(0);
     for (int k = 0; k < m; ++k) {
       odd_[k] = odd ? odd[k] : k & 1;
@@ -193,6 +177,7 @@ class FactoredProblem {
   /// Adds a contact that touches all shared dofs; its number. The caller sets what else it is.
   int append() {
     contacts_[n_].count = -1;
+    coupled_ = false;
     return n_++;
   }
   /// The same, without private part, offset or warm start.
@@ -208,6 +193,7 @@ class FactoredProblem {
   /// The contact touches only these shared dofs (ascending); its rows are then y(i)[k] at dof
   /// index[k].
   void set_index(int i, const int* index, int count) {
+    coupled_ = false;
     contacts_[i].count = count;
     for (int k = 0; k < count; ++k) contacts_[i].index[k] = index[k];
     identity_ = false;
@@ -224,6 +210,15 @@ class FactoredProblem {
     c.odd = odd_;
     c.alternates = true;
     for (int k = 0; k < c.count; ++k) c.alternates = c.alternates && odd_[c.index[k]] == (k & 1);
+  }
+
+  /// Makes `coupling` that of the contacts, which are complete.
+  void find_coupling() {
+    if (coupled_) return;
+    coupling.clear(m_);
+    for (int i = 0; i < n_; ++i) coupling.add(contacts_[i].index, contacts_[i].count);
+    coupling.complete();
+    coupled_ = true;
   }
 
   Row3<S>* y(int i) { return contacts_[i].y; }
@@ -247,7 +242,8 @@ class FactoredProblem {
 
   S* w0 = nullptr;       // (m) in
   S* w = nullptr;        // (m) out
-  S* matrix = nullptr;   // (m, stride): I + sum Y^T N Y, right-hand side in column m
+  S* matrix = nullptr;   // (m, stride): I + sum Y^T N Y
+  Coupling coupling;     // of its dofs
   S* scratch = nullptr;  // (3, stride)
   S* saved = nullptr;    // (5, n, 3) impulses kept by the fallback
   FactoredProblem<double>* lane =
@@ -265,6 +261,7 @@ class FactoredProblem {
     scratch = arena.take<S>(3 * wide);
     saved = arena.take<S>(15 * n);
     odd_ = arena.take<bool>(m);
+    coupling.lay_out(arena, m);
     for (int i = 0; i < n; ++i) {
       int* index = arena.take<int>(m);
       Row3<S>* y = arena.take<Row3<S>>(m);
@@ -295,6 +292,7 @@ class FactoredProblem {
   int n_ = 0, m_ = 0;
   bool* odd_ = nullptr;
   bool identity_ = true;
+  bool coupled_ = false;
 };
 
 /// Y w of a contact on top of `start`: even and odd dofs in two chains, which halves the latency. M

@@ -13,6 +13,8 @@
 #endif
 
 #define STICKSLIP_INLINE inline __attribute__((always_inline))
+// The same after the parameters of a lambda.
+#define STICKSLIP_LAMBDA __attribute__((always_inline))
 
 namespace stickslip::inline STICKSLIP_KERNELS {
 

@@ -4,9 +4,6 @@
 #pragma once
 #include "spatial/spatial.h"
 
-// After the parameters of a lambda.
-#define STICKSLIP_LAMBDA __attribute__((always_inline))
-
 namespace stickslip::inline STICKSLIP_KERNELS {
 
 /// How many, in an X.

@@ -64,9 +64,13 @@ class ContactStage {
   /// Rows and the factored problem; friction per shape. `with_x`: free velocities come from J u + Y
   /// x with the tree's x; otherwise from J u.
   void build_problem(dynamics::Tree<S>& tree, const S* friction, bool with_x);
-  /// Solves; `warm` (3 per support point) is in and out, in force units: impulse = force * h. Lanes
-  /// that are not live keep theirs.
-  void solve(const StepSettings& settings, Mask<S> live, S* warm, S h, LaneInfo<S>& info);
+  /// Where the solve starts: at the forces of the last one (3 per support point), impulse = force *
+  /// h. Given those of the one `earlier`, their change goes on where a point pushed both times.
+  void start_at(const S* last, const S* earlier, S h);
+  /// Solves; `forces` of the points in these lanes become those of the solution.
+  void solve(const StepSettings& settings, Mask<S> live, S* forces, S h, LaneInfo<S>& info);
+  /// In these lanes, `earlier` becomes `last` where the next solve may ask for it.
+  void remember(Mask<S> lanes, const S* last, S* earlier) const;
   /// Adds Y^T lambda to the tree's x in these lanes.
   void add_impulses(dynamics::Tree<S>& tree, Mask<S> lanes) const;
   /// Lanes with a contact that pushes.

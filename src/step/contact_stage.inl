@@ -315,13 +315,37 @@ contact::FactoredOptions solver_options(const StepSettings& settings) {
 }
 
 template <class S>
-void ContactStage<S>::solve(const StepSettings& settings, Mask<S> live, S* warm, S h,
+void ContactStage<S>::start_at(const S* last, const S* earlier, S h) {
+  for (int i = 0; i < count_; ++i) {
+    const int at = 3 * active_[i].id;
+    S f[3] = {last[at], last[at + 1], last[at + 2]};
+    if (earlier) {
+      const S part = constant<S>(tables_->foresight[active_[i].shape]);
+      const Mask<S> pushed = (f[2] > constant<S>(0)) & (earlier[at + 2] > constant<S>(0));
+      for (int r = 0; r < 3; ++r)
+        f[r] = select(pushed, madd(part, f[r] - earlier[at + r], f[r]), f[r]);
+    }
+    for (int r = 0; r < 3; ++r) problem_.impulse(i)[r] = f[r] * h;
+  }
+}
+
+template <class S>
+void ContactStage<S>::remember(Mask<S> lanes, const S* last, S* earlier) const {
+  for (int i = 0; i < count_; ++i) {
+    const int at = 3 * active_[i].id;
+    const Mask<S> here = lanes & active_[i].active;
+    for (int r = 0; r < 3; ++r) earlier[at + r] = select(here, last[at + r], earlier[at + r]);
+  }
+}
+
+template <class S>
+void ContactStage<S>::solve(const StepSettings& settings, Mask<S> live, S* forces, S h,
                             LaneInfo<S>& info) {
   const S zero = constant<S>(0);
   for (int i = 0; i < count_; ++i) {
     problem_.active(i) = active_[i].active & live;
-    for (int r = 0; r < 3; ++r)
-      problem_.impulse(i)[r] = settings.warm_start ? warm[3 * active_[i].id + r] * h : zero;
+    if (!settings.warm_start)
+      for (int r = 0; r < 3; ++r) problem_.impulse(i)[r] = zero;
   }
   if (settings.host.always) {
     solve_by_method(settings.host, info);
@@ -337,12 +361,12 @@ void ContactStage<S>::solve(const StepSettings& settings, Mask<S> live, S* warm,
       solve_by_chain(settings.host, open, o.residual_tolerance, found.allowed, info);
   }
   info.contacts = count_;
-  clear_where(live, 3 * tables_->num_points, warm);
+  clear_where(live, 3 * tables_->num_points, forces);
   for (int i = 0; i < count_; ++i)
     for (int r = 0; r < 3; ++r) {
-      S &impulse = problem_.impulse(i)[r], &w = warm[3 * active_[i].id + r];
+      S &impulse = problem_.impulse(i)[r], &force = forces[3 * active_[i].id + r];
       impulse = impulse + zero;  // a zero is +0, whichever way it came about
-      w = select(live & active_[i].active, impulse / h, w);
+      force = select(live & active_[i].active, impulse / h, force);
     }
 }
 

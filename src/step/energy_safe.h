@@ -250,6 +250,7 @@ class EnergySafeStep {
     c.build_problem(t_, robot_.control.friction, false);
     timer_.end(kDelassus);
     const LaneInfo<S> before = robot_.info;
+    c.start_at(state().impulse, nullptr, h);
     c.solve(settings_, live, state().impulse, h, robot_.info);
     robot_.info.residual = max(before.residual, robot_.info.residual);
     robot_.info.unconverged = before.unconverged | robot_.info.unconverged;

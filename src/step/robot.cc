@@ -97,6 +97,7 @@ void Robot::set_state(std::span<const double> q, std::span<const double> u) {
   if (d.floating())
     for (int k = 3; k < 7; ++k) s.q[k] /= length;
   std::fill(s.impulse.begin(), s.impulse.end(), 0.0);
+  std::fill(s.earlier_impulse.begin(), s.earlier_impulse.end(), 0.0);
   std::fill(s.drift_acceleration.begin(), s.drift_acceleration.end(), 0.0);
   s.pending_gravity = 0;
   s.fresh = true;

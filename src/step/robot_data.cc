@@ -32,6 +32,7 @@ RobotData::RobotData(ModelPtr m, const RobotOptions& o, const StepSolverOptions&
   state.q.assign(m->nq(), 0);
   state.u.assign(nu, 0);
   state.impulse.assign(3 * scene.tables().num_points, 0);
+  state.earlier_impulse.assign(3 * scene.tables().num_points, 0);
   state.drift_acceleration.assign(nu, 0);
   if (floating()) {
     std::copy(o.position.begin(), o.position.end(), state.q.begin());
@@ -53,8 +54,13 @@ void RobotData::forget_step() {
 
 void RobotData::step(StepSettings settings, const Vec3<double>& gravity) {
   LaneState<double>& s = lanes.state;
-  s = {state.q.data(),        state.u.data(), state.impulse.data(), state.drift_acceleration.data(),
-       state.pending_gravity, state.fresh};
+  s = {state.q.data(),
+       state.u.data(),
+       state.impulse.data(),
+       state.earlier_impulse.data(),
+       state.drift_acceleration.data(),
+       state.pending_gravity,
+       state.fresh};
   const RobotControl& c = control;
   const bool on_base = c.force && floating() &&
                        std::any_of(c.generalized_force.begin(), c.generalized_force.begin() + 6,

@@ -15,6 +15,8 @@ struct RobotState {
   std::vector<double>
       impulse;  // per support point (3), of the last solve, over its step length [N]
   double time = 0;
+  // Semi-implicit integrator only.
+  std::vector<double> earlier_impulse;  // of the solve before
   // Energy-safe integrator only.
   std::vector<double> drift_acceleration;  // -M^-1 C(q, u) at q: predictor of the next drift
   double pending_gravity =

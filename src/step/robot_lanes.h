@@ -13,6 +13,8 @@ template <class S>
 struct LaneState {
   S *q, *u;
   S* impulse;  // per support point (3), of the last solve, over its step length [N]
+  // Semi-implicit integrator only.
+  S* earlier_impulse;  // the same of the solve before, where both pushed: the next may go on so
   // Energy-safe integrator only.
   S* drift_acceleration;  // -M^-1 C(q, u) at q: predictor of the next drift
   S pending_gravity;      // time of gravity not yet in u: half the last step while in contact [s]
@@ -82,6 +84,7 @@ struct RobotLanes {
     backup.q = arena.take<S>(t.nq);
     backup.u = arena.take<S>(t.nu);
     backup.impulse = arena.take<S>(3 * t.num_points);
+    backup.earlier_impulse = arena.take<S>(3 * t.num_points);
     backup.drift_acceleration = arena.take<S>(t.nu);
   }
 
@@ -111,6 +114,7 @@ STICKSLIP_INLINE void copy_state(const RobotTables& t, const LaneState<S>& from,
   copy(from.q, t.nq, to.q);
   copy(from.u, t.nu, to.u);
   copy(from.impulse, 3 * t.num_points, to.impulse);
+  copy(from.earlier_impulse, 3 * t.num_points, to.earlier_impulse);
   copy(from.drift_acceleration, t.nu, to.drift_acceleration);
   to.pending_gravity = from.pending_gravity;
   to.fresh = from.fresh;
@@ -122,6 +126,7 @@ STICKSLIP_INLINE void copy_state_where(const RobotTables& t, Mask<S> m, const La
   copy_where(m, from.q, t.nq, to.q);
   copy_where(m, from.u, t.nu, to.u);
   copy_where(m, from.impulse, 3 * t.num_points, to.impulse);
+  copy_where(m, from.earlier_impulse, 3 * t.num_points, to.earlier_impulse);
   copy_where(m, from.drift_acceleration, t.nu, to.drift_acceleration);
   to.pending_gravity = select(m, from.pending_gravity, to.pending_gravity);
   to.fresh = (m & from.fresh) | ((!m) & to.fresh);

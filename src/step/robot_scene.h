@@ -27,7 +27,7 @@ class RobotScene {
  private:
   std::vector<collide::GroundShape> shapes_;
   std::vector<MaterialPair> laws_;
-  std::vector<double> friction_, restitution_, threshold_, damping_;
+  std::vector<double> friction_, restitution_, threshold_, foresight_, damping_;
   std::unique_ptr<bool[]> prismatic_;
   RobotTables tables_;
 };

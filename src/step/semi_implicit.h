@@ -74,6 +74,7 @@ void step_semi_implicit(RobotLanes<S>& robot, const StepSettings& settings) {
   if (contacts.count() > 0) {
     contacts.build_problem(t, robot.control.friction, true);
     timer.end(kDelassus);
+    contacts.start_at(s.impulse, settings.host.always ? nullptr : s.earlier_impulse, dt);
     contacts.solve(settings, everywhere, s.impulse, dt, robot.info);
     contacts.add_impulses(t, everywhere);
     timer.end(kSolve);
@@ -94,6 +95,7 @@ void step_semi_implicit(RobotLanes<S>& robot, const StepSettings& settings) {
   const Mask<S> finite = is_finite(sum_of_sizes(q_new, nq, sum_of_sizes(next, nu, zero)));
   copy_where(finite, q_new, nq, s.q);
   copy_where(finite, next, nu, s.u);
+  contacts.remember(finite, robot.backup.impulse, s.earlier_impulse);
   if (!all(finite)) {
     copy_where(!finite, robot.backup.impulse, 3 * tables.num_points, s.impulse);
     contacts.forget(!finite);

@@ -8,7 +8,7 @@
 namespace stickslip::step {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x32304c5053535453;  // "STSSPL02"
+constexpr std::uint64_t kMagic = 0x33304c5053535453;  // "STSSPL03"
 
 class Writer {
  public:
@@ -92,7 +92,8 @@ std::vector<std::uint8_t> write_snapshot(double time, const std::vector<const Ro
   for (const RobotData* robot : robots) {
     const RobotState& s = robot->state;
     w.text(robot->name + "/" + robot->model->name());
-    for (const auto* v : {&s.q, &s.u, &s.impulse, &s.drift_acceleration}) w.numbers(*v);
+    for (const auto* v : {&s.q, &s.u, &s.impulse, &s.earlier_impulse, &s.drift_acceleration})
+      w.numbers(*v);
     w.number(s.time);
     w.number(s.pending_gravity);
     w.count(s.fresh);
@@ -118,6 +119,7 @@ Snapshot read_snapshot(std::span<const std::uint8_t> blob,
     r.numbers(s.q, robot->state.q.size());
     r.numbers(s.u, robot->state.u.size());
     r.numbers(s.impulse, robot->state.impulse.size());
+    r.numbers(s.earlier_impulse, robot->state.earlier_impulse.size());
     r.numbers(s.drift_acceleration, robot->state.drift_acceleration.size());
     check_quaternion(*robot, s);
     s.time = r.number();

@@ -242,7 +242,7 @@ std::uint32_t Batch::Impl::step(int steps, bool continues) {
 
 namespace {
 
-constexpr std::uint64_t kMagic = 0x3130544142535453;  // "STSBAT01"
+constexpr std::uint64_t kMagic = 0x3230544142535453;  // "STSBAT02"
 constexpr BatchField kSaved[] = {BatchField::kQ,
                                  BatchField::kU,
                                  BatchField::kContactImpulse,

@@ -42,17 +42,18 @@ struct EnvArrays {
 };
 
 /// What an environment carries from step to step besides q and u, per pack: T (numbers, lanes).
-/// Order: q and u that the last step left, warm-start impulses, drift acceleration, pending
-/// gravity, whether the state is new (1) or of a step (0), whether the environment was set aside
-/// (1).
+/// Order: q and u that the last step left, forces of the last solve and the one before, drift
+/// acceleration, pending gravity, whether the state is new (1) or of a step (0), whether the
+/// environment was set aside (1).
 struct PackHistory {
-  int q, u, impulse, drift, pending, fresh, aside, numbers;  // first row of each
+  int q, u, impulse, earlier, drift, pending, fresh, aside, numbers;  // first row of each
   // Inline always: the host and every instruction set call it.
   STICKSLIP_INLINE explicit PackHistory(const step::RobotTables& t)
       : q(0),
         u(t.nq),
         impulse(u + t.nu),
-        drift(impulse + 3 * t.num_points),
+        earlier(impulse + 3 * t.num_points),
+        drift(earlier + 3 * t.num_points),
         pending(drift + t.nu),
         fresh(pending + 1),
         aside(fresh + 1),

@@ -74,6 +74,7 @@ void PackLanes<S>::lay_out(contact::Arena& arena, const PackScene& scene) {
   s.q = arena.take<S>(t.nq);
   s.u = arena.take<S>(t.nu);
   s.impulse = arena.take<S>(3 * t.num_points);
+  s.earlier_impulse = arena.take<S>(3 * t.num_points);
   s.drift_acceleration = arena.take<S>(t.nu);
   force_ = arena.take<S>(t.nu);
   for (S** array : {&kp_, &kd_, &target_}) *array = arena.take<S>(t.num_joints);
@@ -125,11 +126,13 @@ void PackLanes<S>::load(const EnvArrays& arrays, long first, long num_envs) {
   step::copy(past + h.q, t.nq, last_q_);
   step::copy(past + h.u, t.nu, last_u_);
   step::copy(past + h.impulse, 3 * t.num_points, s.impulse);
+  step::copy(past + h.earlier, 3 * t.num_points, s.earlier_impulse);
   step::copy(past + h.drift, t.nu, s.drift_acceleration);
   s.pending_gravity = past[h.pending];
   S fresh = past[h.fresh];
   repeat(s.q, t.nq), repeat(s.u, t.nu), repeat(last_q_, t.nq), repeat(last_u_, t.nu);
-  repeat(s.impulse, 3 * t.num_points), repeat(s.drift_acceleration, t.nu);
+  repeat(s.impulse, 3 * t.num_points), repeat(s.earlier_impulse, 3 * t.num_points);
+  repeat(s.drift_acceleration, t.nu);
   repeat(&s.pending_gravity, 1), repeat(&fresh, 1);
   s.fresh = fresh > constant<S>(0.5);
   check_state();
@@ -177,6 +180,7 @@ void PackLanes<S>::check_state() {
   s.fresh = s.fresh | fresh;
   s.pending_gravity = select(fresh, zero, s.pending_gravity);
   step::clear_where(fresh, 3 * t.num_points, s.impulse);
+  step::clear_where(fresh, 3 * t.num_points, s.earlier_impulse);
   step::copy_where(fresh, s.q, t.nq, last_q_);
   step::copy_where(fresh, s.u, t.nu, last_u_);
 }
@@ -285,10 +289,12 @@ StatusBits PackLanes<S>::store(const EnvArrays& arrays, const step::StepSettings
     step::copy_where(set_aside_, last_q_, t.nq, s.q);
     step::copy_where(set_aside_, last_u_, t.nu, s.u);
     const Mask<S> old = set_aside_ & !fresh_;
-    for (int k = 0; k < 3 * t.num_points; ++k) {
-      s.impulse[k] = select(set_aside_, zero, s.impulse[k]);
-      s.impulse[k] = select(old, past[h.impulse + k], s.impulse[k]);
-    }
+    const auto take_back = [&](int row, S* forces) {
+      step::clear_where(set_aside_, 3 * t.num_points, forces);
+      step::copy_where(old, past + row, 3 * t.num_points, forces);
+    };
+    take_back(h.impulse, s.impulse);
+    take_back(h.earlier, s.earlier_impulse);
     step::copy_where(set_aside_, past + h.drift, t.nu, s.drift_acceleration);
     s.pending_gravity = select(set_aside_, zero, s.pending_gravity);
     s.pending_gravity = select(old, past[h.pending], s.pending_gravity);
@@ -300,6 +306,7 @@ StatusBits PackLanes<S>::store(const EnvArrays& arrays, const step::StepSettings
   step::copy(s.q, t.nq, past + h.q);
   step::copy(s.u, t.nu, past + h.u);
   step::copy(s.impulse, 3 * t.num_points, past + h.impulse);
+  step::copy(s.earlier_impulse, 3 * t.num_points, past + h.earlier);
   step::copy(s.drift_acceleration, t.nu, past + h.drift);
   past[h.pending] = s.pending_gravity;
   past[h.fresh] = select(s.fresh, one, zero);

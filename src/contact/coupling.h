@@ -1,0 +1,74 @@
+// Which shared dofs couple in the matrix of a Newton step, and in what order they leave it.
+//
+// Two dofs couple if a contact touches both. Dofs are eliminated from the last to the first, which
+// in a tree (parents come first) couples no others: of a chain's dofs each couples with its
+// ancestors, and two legs only through the base. Index lists that are no tree fill in; what they
+// fill is in the lists too [George, Liu 1981, ch. 5].
+#pragma once
+#include "contact/arena.h"
+
+namespace stickslip::contact::inline STICKSLIP_KERNELS {
+
+class Coupling {
+ public:
+  void lay_out(Arena& arena, int dofs) {
+    const int words = (dofs + kBits - 1) / kBits;
+    rows_ = arena.take<Word>(long(dofs) * words);
+    touched_ = arena.take<Word>(words);
+    lists_ = arena.take<int>(long(dofs) * dofs);
+    count_ = arena.take<int>(dofs);
+  }
+
+  /// Nothing couples yet among m dofs.
+  void clear(int m) {
+    m_ = m;
+    words_ = (m + kBits - 1) / kBits;
+    for (int k = 0; k < m * words_; ++k) rows_[k] = 0;
+  }
+  /// A contact touches these dofs (ascending).
+  void add(const int* index, int count) {
+    for (int w = 0; w < words_; ++w) touched_[w] = 0;
+    for (int k = 0; k < count; ++k) {
+      // What is there so far comes before index[k].
+      Word* row = rows_ + index[k] * words_;
+      for (int w = 0; w < words_; ++w) row[w] |= touched_[w];
+      touched_[index[k] / kBits] |= Word(1) << index[k] % kBits;
+    }
+  }
+  /// Fills in what elimination couples, and writes the lists.
+  void complete() {
+    for (int j = m_ - 1; j >= 0; --j) {
+      const Word* row = rows_ + j * words_;
+      int* list = lists_ + j * m_;
+      int n = 0;
+      for (int w = 0; w < words_; ++w)
+        for (Word left = row[w]; left; left &= left - 1)
+          list[n++] = w * kBits + __builtin_ctzll(left);
+      count_[j] = n;
+      if (n < 2) continue;
+      const int next = list[n - 1];
+      Word* to = rows_ + next * words_;
+      for (int w = 0; w < words_; ++w) to[w] |= row[w];
+      to[next / kBits] &= ~(Word(1) << next % kBits);
+    }
+  }
+
+  /// The dofs before j that it couples with when its turn comes, ascending.
+  const int* list(int j) const { return lists_ + j * m_; }
+  int count(int j) const { return count_[j]; }
+  /// Whether j and the two before it couple with each other and otherwise with the same dofs.
+  bool three(int j) const { return follows(j) && follows(j - 1); }
+
+ private:
+  using Word = unsigned long long;
+  static constexpr int kBits = 64;
+  bool follows(int j) const {
+    return j > 0 && count_[j] == count_[j - 1] + 1 && list(j)[count_[j] - 1] == j - 1;
+  }
+
+  int m_ = 0, words_ = 0;
+  Word *rows_ = nullptr, *touched_ = nullptr;  // (dofs, words): sets of dofs
+  int *lists_ = nullptr, *count_ = nullptr;
+};
+
+}  // namespace stickslip::contact::inline STICKSLIP_KERNELS
