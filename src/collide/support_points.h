@@ -6,12 +6,12 @@
 
 namespace stickslip::collide::inline STICKSLIP_KERNELS {
 
-/// A shape placed in the world: center relative to the base origin, and axes.
+/// A shape placed in the world, relative to the base origin.
 template <class S>
 struct PlacedShape {
   Vec3<S> center;
-  Mat3<S> axes;
-  S lowest;  // height of its lowest point above the base origin, never too high
+  S lowest;      // height of its lowest point above the base origin, never too high
+  Mat3<S> axes;  // see orient; a sphere has none
 };
 
 template <class S>
@@ -28,6 +28,21 @@ STICKSLIP_INLINE Vec3<S> shape_center(const dynamics::Tree<S>& tree, const Groun
   return dynamics::point_position(tree, shape.link, constant3<S>(shape.center));
 }
 
+/// Rotation of the link and of the shape on it.
+template <class S>
+STICKSLIP_INLINE Mat3<S> link_rotation(const dynamics::Tree<S>& tree, const GroundShape& shape) {
+  if (shape.link.slot == dynamics::kBaseSlot) return tree.base.rotation;
+  return dynamics::field_of<S, Mat3>(tree, shape.link,
+                                     &dynamics::LinkState<dynamics::Wide<S>>::rotation);
+}
+template <class S>
+STICKSLIP_INLINE Mat3<S> shape_rotation(const GroundShape& shape) {
+  Mat3<S> axes;
+  for (int k = 0; k < 9; ++k) axes.m[k] = constant<S>(shape.axes[k]);
+  return axes;
+}
+
+/// Center and lowest point, which is all that a shape far from the ground needs.
 template <class S>
 PlacedShape<S> place(const dynamics::Tree<S>& tree, const GroundShape& shape) {
   PlacedShape<S> p;
@@ -36,20 +51,26 @@ PlacedShape<S> place(const dynamics::Tree<S>& tree, const GroundShape& shape) {
     p.lowest = p.center.z - constant<S>(shape.radius);
     return p;
   }
-  const Mat3<S> r = shape.link.slot == dynamics::kBaseSlot
-                        ? tree.base.rotation
-                        : dynamics::field_of<S, Mat3>(
-                              tree, shape.link, &dynamics::LinkState<dynamics::Wide<S>>::rotation);
-  Mat3<S> axes;
-  for (int k = 0; k < 9; ++k) axes.m[k] = constant<S>(shape.axes[k]);
-  p.axes = r * axes;
-  const S x = abs(p.axes.m[6]), y = abs(p.axes.m[7]), z = abs(p.axes.m[8]);
+  // Heights of the tips of the axes: a row of their matrix.
+  const Mat3<S> r = link_rotation(tree, shape), axes = shape_rotation<S>(shape);
+  const auto height = [&](int k) {
+    return abs(dot(Vec3<S>{r.m[6], r.m[7], r.m[8]}, column(axes, k)));
+  };
+  const S x = height(0), y = height(1), z = height(2);
   const Vec3<S> half = constant3<S>(shape.half);
   if (shape.type == ShapeType::kBox)
     p.lowest = p.center.z - (x * half.x + y * half.y + z * half.z);
   else  // capsule; a cylinder lies inside the capsule-like bound radius + half length * |axis|
     p.lowest = p.center.z - (half.x + z * half.z);
   return p;
+}
+
+/// Adds the axes, for `support_point`.
+template <class S>
+STICKSLIP_INLINE void orient(const dynamics::Tree<S>& tree, const GroundShape& shape,
+                             PlacedShape<S>& p) {
+  if (shape.type != ShapeType::kSphere)
+    p.axes = link_rotation(tree, shape) * shape_rotation<S>(shape);
 }
 
 /// Center of support point `point` of a cylinder: cap = point / 4, rim direction = point % 4.

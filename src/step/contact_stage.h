@@ -67,10 +67,9 @@ class ContactStage {
   /// Where the solve starts: at the forces of the last one (3 per support point), impulse = force *
   /// h. Given those of the one `earlier`, their change goes on where a point pushed both times.
   void start_at(const S* last, const S* earlier, S h);
-  /// Solves; `forces` of the points in these lanes become those of the solution.
-  void solve(const StepSettings& settings, Mask<S> live, S* forces, S h, LaneInfo<S>& info);
-  /// In these lanes, `earlier` becomes `last` where the next solve may ask for it.
-  void remember(Mask<S> lanes, const S* last, S* earlier) const;
+  void solve(const StepSettings& settings, Mask<S> live, LaneInfo<S>& info);
+  /// The solution as forces of all points, for the lanes that were live: impulse = force * h.
+  void write_forces(Mask<S> live, S h, S* forces) const;
   /// Adds Y^T lambda to the tree's x in these lanes.
   void add_impulses(dynamics::Tree<S>& tree, Mask<S> lanes) const;
   /// Lanes with a contact that pushes.
@@ -104,6 +103,9 @@ class ContactStage {
   void detect_within(const dynamics::Tree<S>& tree, S clearance, S reach, Mask<S> live);
   S fastest_shape(const dynamics::Tree<S>& tree, const Vec3<S>& base_velocity) const;
   void compute_rows(dynamics::Tree<S>& tree);
+  /// Whether no two of the points in the list can have a joint in common.
+  bool apart() const;
+  void find_shared_joints();
   void number_shared_dofs(const dynamics::Tree<S>& tree);
   void fill_contact(const dynamics::Tree<S>& tree, const ActiveContact<S>& a, const S* friction,
                     bool with_x);
@@ -117,9 +119,13 @@ class ContactStage {
   collide::PlacedShape<S>* placed_;
   ActiveContact<S>* active_;
   int count_ = 0;
-  // Joints above active contacts, per slot and lane of a bundle.
+  /// Number of a link's joint among the shared dofs; -1: private in all lanes.
+  int shared_dof(dynamics::LinkIndex link) const { return num_shared_ ? dof_[flat(link)] : -1; }
+
+  // Joints above active contacts, per slot and lane of a bundle; unset where there are no shared
+  // dofs.
   Mask<S>*once_, *shared_;  // lanes where one contact, two or more of them are below
-  int* dof_;                // number among the shared dofs; -1: private in all lanes
+  int* dof_;                // see shared_dof
   dynamics::LinkIndex* link_of_dof_;
   int num_shared_ = 0;
   int* index_;

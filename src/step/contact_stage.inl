@@ -65,6 +65,7 @@ void ContactStage<S>::detect_within(const dynamics::Tree<S>& tree, S clearance, 
     placed_[s] = collide::place(tree, shape);
     const Mask<S> near = live & (placed_[s].lowest + clearance < reach);
     if (!any(near)) continue;
+    collide::orient(tree, shape, placed_[s]);
     for (int k = 0; k < shape.num_points; ++k) {
       const Vec3<S> p = collide::support_point(shape, placed_[s], k);
       const S gap = p.z + clearance;
@@ -166,11 +167,25 @@ void ContactStage<S>::add_restitution(S fall, S h) {
 
 template <class S>
 void ContactStage<S>::compute_rows(dynamics::Tree<S>& tree) {
-  for (int k = 0; k < links(); ++k) once_[k] = shared_[k] = none<S>(), dof_[k] = -1;
   for (int i = 0; i < count_; ++i) {
     ActiveContact<S>& a = active_[i];
     a.rows.base = problem_.y(i);  // where the problem wants them
     dynamics::compute_contact_rows(tree, tables_->shapes[a.shape].link, a.position, a.rows);
+  }
+}
+
+template <class S>
+bool ContactStage<S>::apart() const {
+  for (int i = 0; i < count_; ++i)
+    if (!tables_->apart[active_[i].shape]) return false;
+  return true;
+}
+
+template <class S>
+void ContactStage<S>::find_shared_joints() {
+  for (int k = 0; k < links(); ++k) once_[k] = shared_[k] = none<S>(), dof_[k] = -1;
+  for (int i = 0; i < count_; ++i) {
+    const ActiveContact<S>& a = active_[i];
     for (int k = 0; k < a.rows.depth; ++k) {
       const int j = flat(a.rows.path[k]);
       shared_[j] = shared_[j] | (once_[j] & a.active);
@@ -183,7 +198,6 @@ void ContactStage<S>::compute_rows(dynamics::Tree<S>& tree) {
 /// dofs in an order that does not depend on the others.
 template <class S>
 void ContactStage<S>::number_shared_dofs(const dynamics::Tree<S>& tree) {
-  num_shared_ = 0;
   const auto joint = [&](dynamics::LinkIndex l) { return tree.slots[l.slot].joint[l.lane]; };
   for (int i = 0; i < count_; ++i)
     for (int k = 0; k < active_[i].rows.depth; ++k) {
@@ -196,7 +210,6 @@ void ContactStage<S>::number_shared_dofs(const dynamics::Tree<S>& tree) {
       link_of_dof_[at] = link;
     }
   const int first = tables_->floating ? 6 : 0;
-  for (int k = 0; k < first; ++k) odd_[k] = k & 1;
   for (int k = 0; k < num_shared_; ++k) {
     int& dof = dof_[flat(link_of_dof_[k])];
     odd_[first + k] = dof & 1;
@@ -207,8 +220,13 @@ void ContactStage<S>::number_shared_dofs(const dynamics::Tree<S>& tree) {
 template <class S>
 void ContactStage<S>::build_problem(dynamics::Tree<S>& tree, const S* friction, bool with_x) {
   compute_rows(tree);
-  number_shared_dofs(tree);
   const int base_dofs = tables_->floating ? 6 : 0;
+  for (int k = 0; k < base_dofs; ++k) odd_[k] = k & 1;
+  num_shared_ = 0;
+  if (!apart()) {
+    find_shared_joints();
+    number_shared_dofs(tree);
+  }
   problem_.clear(base_dofs + num_shared_, odd_);
   if (with_x) {
     for (int k = 0; k < base_dofs; ++k) problem_.w0[k] = tree.base.x[k];
@@ -279,7 +297,7 @@ void ContactStage<S>::fill_contact(const dynamics::Tree<S>& tree, const ActiveCo
   BlockSum<S> own;  // the private block
   for (int k = a.rows.depth - 1; k >= 0; --k) {
     const dynamics::LinkIndex link = a.rows.path[k];
-    const int dof = dof_[flat(link)];
+    const int dof = shared_dof(link);
     Row3<S> row = a.rows.joint[k];
     if (dof >= 0) {
       const Mask<S> shared = shared_[flat(link)];
@@ -330,17 +348,7 @@ void ContactStage<S>::start_at(const S* last, const S* earlier, S h) {
 }
 
 template <class S>
-void ContactStage<S>::remember(Mask<S> lanes, const S* last, S* earlier) const {
-  for (int i = 0; i < count_; ++i) {
-    const int at = 3 * active_[i].id;
-    const Mask<S> here = lanes & active_[i].active;
-    for (int r = 0; r < 3; ++r) earlier[at + r] = select(here, last[at + r], earlier[at + r]);
-  }
-}
-
-template <class S>
-void ContactStage<S>::solve(const StepSettings& settings, Mask<S> live, S* forces, S h,
-                            LaneInfo<S>& info) {
+void ContactStage<S>::solve(const StepSettings& settings, Mask<S> live, LaneInfo<S>& info) {
   const S zero = constant<S>(0);
   for (int i = 0; i < count_; ++i) {
     problem_.active(i) = active_[i].active & live;
@@ -361,13 +369,21 @@ void ContactStage<S>::solve(const StepSettings& settings, Mask<S> live, S* force
       solve_by_chain(settings.host, open, o.residual_tolerance, found.allowed, info);
   }
   info.contacts = count_;
+  for (int i = 0; i < count_; ++i)  // a zero is +0, whichever way it came about
+    for (int r = 0; r < 3; ++r) problem_.impulse(i)[r] = problem_.impulse(i)[r] + zero;
+}
+
+template <class S>
+void ContactStage<S>::write_forces(Mask<S> live, S h, S* forces) const {
+  const S inverse = constant<S>(1) / h;
   clear_where(live, 3 * tables_->num_points, forces);
-  for (int i = 0; i < count_; ++i)
+  for (int i = 0; i < count_; ++i) {
+    const Mask<S> here = live & active_[i].active;
     for (int r = 0; r < 3; ++r) {
-      S &impulse = problem_.impulse(i)[r], &force = forces[3 * active_[i].id + r];
-      impulse = impulse + zero;  // a zero is +0, whichever way it came about
-      force = select(live & active_[i].active, impulse / h, force);
+      S& force = forces[3 * active_[i].id + r];
+      force = select(here, impulse(i)[r] * inverse, force);
     }
+  }
 }
 
 template <class S>
@@ -390,7 +406,7 @@ void ContactStage<S>::add_impulses(dynamics::Tree<S>& tree, Mask<S> lanes) const
     for (int k = 0; k < active_[i].rows.depth; ++k) {
       const dynamics::LinkIndex link = active_[i].rows.path[k];
       Row3<S> row = active_[i].rows.joint[k];
-      if (dof_[flat(link)] >= 0) {
+      if (shared_dof(link) >= 0) {
         if (!any(active_[i].active & !shared_[flat(link)])) continue;
         row = row_where(!shared_[flat(link)], row);
       }
@@ -492,7 +508,10 @@ Mask<S> ContactStage<S>::correct_overlap(dynamics::Tree<S>& tree, S clearance, d
   for (int i = 0; i < count_; ++i) {
     const int s = active_[i].shape;
     const collide::GroundShape& shape = tables_->shapes[s];
-    if (i == 0 || s != active_[i - 1].shape) placed_[s] = collide::place(tree, shape);
+    if (i == 0 || s != active_[i - 1].shape) {
+      placed_[s] = collide::place(tree, shape);
+      collide::orient(tree, shape, placed_[s]);
+    }
     const Vec3<S> p = collide::support_point(shape, placed_[s], active_[i].point);
     overlap_.add(shape.link, p, p.z + clearance, active_[i].active);
   }

@@ -6,16 +6,18 @@
 
 namespace stickslip::step::inline STICKSLIP_KERNELS {
 
-/// q <- q (+) h v: positions and joints add, the base quaternion turns by the exponential map.
+/// to = q (+) h v: positions and joints add, the base quaternion turns by the exponential map. A
+/// zero is +0, whichever way it came about.
 template <class S>
-void integrate_configuration(const RobotTables& t, S* q, const S* v, S h) {
+void integrate_configuration(const RobotTables& t, const S* q, const S* v, S h, S* to) {
+  const S zero = constant<S>(0);
   const int joints = t.num_joints;
   if (!t.floating) {
-    for (int j = 0; j < joints; ++j) q[j] = madd(h, v[j], q[j]);
+    for (int j = 0; j < joints; ++j) to[j] = madd(h, v[j], q[j]) + zero;
     return;
   }
-  for (int k = 0; k < 3; ++k) q[k] = madd(h, v[k], q[k]);
-  for (int j = 0; j < joints; ++j) q[7 + j] = madd(h, v[6 + j], q[7 + j]);
+  for (int k = 0; k < 3; ++k) to[k] = madd(h, v[k], q[k]) + zero;
+  for (int j = 0; j < joints; ++j) to[7 + j] = madd(h, v[6 + j], q[7 + j]) + zero;
   // exp(h w / 2) q, with sin(t)/t from its series where the division would lose digits.
   const S one = constant<S>(1), half = constant<S>(0.5) * h;
   const Vec3<S> r{half * v[3], half * v[4], half * v[5]};
@@ -25,24 +27,22 @@ void integrate_configuration(const RobotTables& t, S* q, const S* v, S h) {
   const auto large = angle > constant<S>(1e-4);
   const S sinc = select(large, s / select(large, angle, one), one - t2 * constant<S>(1.0 / 6));
   const Vec3<S> e = r * sinc;
-  S* p = q + 3;
+  const S* p = q + 3;
   const S w = p[0], x = p[1], y = p[2], z = p[3];
   const S n[4] = {c * w - e.x * x - e.y * y - e.z * z, c * x + e.x * w + e.y * z - e.z * y,
                   c * y + e.y * w + e.z * x - e.x * z, c * z + e.z * w + e.x * y - e.y * x};
   const S inv = one / sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2] + n[3] * n[3]);
-  for (int k = 0; k < 4; ++k) p[k] = n[k] * inv;
+  for (int k = 0; k < 4; ++k) to[3 + k] = n[k] * inv + zero;
 }
 
-/// Joint-space diagonal that makes damping and PD control implicit over h: h (kd + damping) + h^2
-/// kp, docs/theory/step.md (S2). Null if there is none.
+/// Joint-space diagonal that makes damping and PD control implicit over h: h damping + h^2 kp,
+/// docs/theory/step.md (S2). Null if there is none.
 template <class S>
 const S* implicit_diagonal(RobotLanes<S>& robot, S h) {
   const RobotTables& t = *robot.tables;
   if (!robot.control.pd && !t.damped) return nullptr;
-  for (int j = 0; j < t.num_joints; ++j) {
-    const S damping = constant<S>(t.damping[j]);
-    robot.implicit[j] = h * (robot.control.kd[j] + damping + h * robot.control.kp[j]);
-  }
+  for (int j = 0; j < t.num_joints; ++j)
+    robot.implicit[j] = h * (robot.control.damping[j] + h * robot.control.kp[j]);
   return robot.implicit;
 }
 
@@ -59,8 +59,7 @@ bool control_force(RobotLanes<S>& robot, const S* q, const S* u, S h) {
   for (int j = 0; j < t.num_joints; ++j) {
     const S rate = u[offset + j];
     robot.force[offset + j] = c.generalized_force[offset + j] +
-                              c.kp[j] * (c.target[j] - joints[j] - h * rate) -
-                              (c.kd[j] + constant<S>(t.damping[j])) * rate;
+                              c.kp[j] * (c.target[j] - joints[j] - h * rate) - c.damping[j] * rate;
   }
   return true;
 }

@@ -238,12 +238,7 @@ class EnergySafeStep {
     }
     timer_.end(kDetection);
     robot_.info.contacts = c.count();
-    if (c.count() == 0) {
-      S* impulse = state().impulse;
-      for (int k = 0; k < 3 * tables_.num_points; ++k)
-        impulse[k] = select(live, number(0), impulse[k]);
-      return;
-    }
+    if (c.count() == 0) return clear_where(live, 3 * tables_.num_points, state().impulse);
     c.allow_closing(h, kOverlapTolerance);
     gravity_at_contacts();
     c.add_restitution(fall_, h);
@@ -251,7 +246,8 @@ class EnergySafeStep {
     timer_.end(kDelassus);
     const LaneInfo<S> before = robot_.info;
     c.start_at(state().impulse, nullptr, h);
-    c.solve(settings_, live, state().impulse, h, robot_.info);
+    c.solve(settings_, live, robot_.info);
+    c.write_forces(live, h, state().impulse);
     robot_.info.residual = max(before.residual, robot_.info.residual);
     robot_.info.unconverged = before.unconverged | robot_.info.unconverged;
     pushed_ = c.any_impulse();
@@ -325,8 +321,7 @@ class EnergySafeStep {
   void move(const S* from, const S* velocity, S h, Mask<S> lanes) {
     S* to = robot_.q_new;
     S* moved = robot_.q_moved;
-    copy(from, tables_.nq, moved);
-    integrate_configuration(tables_, moved, velocity, h);
+    integrate_configuration(tables_, from, velocity, h, moved);
     for (int k = 0; k < tables_.nq; ++k) to[k] = select(lanes, moved[k], from[k]);
     robot_.compute_positions(to);
   }

@@ -11,13 +11,31 @@ STICKSLIP_INLINE void copy(const S* from, int n, S* to) {
 /// to <- from in the lanes of the mask.
 template <class S>
 STICKSLIP_INLINE void copy_where(Mask<S> m, const S* from, int n, S* to) {
-  for (int k = 0; k < n; ++k) to[k] = select(m, from[k], to[k]);
+  if (all(m))  // as most often: nothing of `to` has to be read
+    copy(from, n, to);
+  else
+    for (int k = 0; k < n; ++k) to[k] = select(m, from[k], to[k]);
+}
+template <class S>
+STICKSLIP_INLINE void swap(S*& a, S*& b) {
+  S* c = a;
+  a = b;
+  b = c;
+}
+/// a <-> b in the lanes of the mask.
+template <class S>
+STICKSLIP_INLINE void swap_where(Mask<S> m, int n, S* a, S* b) {
+  for (int k = 0; k < n; ++k) {
+    const S x = a[k];
+    a[k] = select(m, b[k], x);
+    b[k] = select(m, x, b[k]);
+  }
 }
 /// to <- 0 in the lanes of the mask.
 template <class S>
 STICKSLIP_INLINE void clear_where(Mask<S> m, int n, S* to) {
   const S zero = constant<S>(0);
-  if (all(m))  // as most often: nothing has to be read
+  if (all(m))
     for (int k = 0; k < n; ++k) to[k] = zero;
   else
     for (int k = 0; k < n; ++k) to[k] = select(m, zero, to[k]);

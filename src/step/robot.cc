@@ -121,6 +121,8 @@ void Robot::set_pd_gains(std::span<const double> kp, std::span<const double> kd)
   std::copy(kp.begin(), kp.end(), c.kp.begin());
   std::copy(kd.begin(), kd.end(), c.kd.begin());
   c.pd = any_nonzero(kp) || any_nonzero(kd);
+  const double* own = impl_->data.scene.tables().damping;
+  for (size_t j = 0; j < kd.size(); ++j) c.damping[j] = kd[j] + own[j];
   impl_->data.lanes.prepared_step = 0;  // the factor holds the gains
 }
 

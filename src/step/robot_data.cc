@@ -17,6 +17,14 @@ AlignedBlock give_memory(RobotLanes<double>& lanes, const RobotTables& tables) {
   return block;
 }
 
+/// An array of the state that a step may have exchanged with its workspace.
+void take_back(double*& held, double*& workspace, std::vector<double>& mine) {
+  if (held == mine.data()) return;
+  std::copy_n(held, mine.size(), mine.data());
+  workspace = held;
+  held = mine.data();
+}
+
 }  // namespace
 
 RobotData::RobotData(ModelPtr m, const RobotOptions& o, const StepSolverOptions& solver)
@@ -42,6 +50,7 @@ RobotData::RobotData(ModelPtr m, const RobotOptions& o, const StepSolverOptions&
   control.kp.assign(joints, 0);
   control.kd.assign(joints, 0);
   control.target.assign(joints, 0);
+  control.damping.assign(scene.tables().damping, scene.tables().damping + joints);
   lanes.tree = &memory.tree();
   lanes.contact_origin = zero3<double>();
   lanes.prepared_step = 0;
@@ -67,8 +76,8 @@ void RobotData::step(StepSettings settings, const Vec3<double>& gravity) {
                                    [](double x) { return x != 0; });
   lanes.control = {c.generalized_force.data(),
                    c.kp.data(),
-                   c.kd.data(),
                    c.target.data(),
+                   c.damping.data(),
                    scene.friction().data(),
                    nullptr,
                    nullptr,
@@ -82,6 +91,9 @@ void RobotData::step(StepSettings settings, const Vec3<double>& gravity) {
     step_energy_safe(lanes, settings);
   else
     step_semi_implicit(lanes, settings);
+  take_back(s.q, lanes.q_new, state.q);
+  take_back(s.u, lanes.u_plus, state.u);
+  if (s.impulse != state.impulse.data()) state.impulse.swap(state.earlier_impulse);
   state.pending_gravity = s.pending_gravity;
   state.fresh = s.fresh;
   const LaneInfo<double>& i = lanes.info;

@@ -28,6 +28,7 @@ struct RobotState {
 struct RobotControl {
   std::vector<double> generalized_force;  // (nu)
   std::vector<double> kp, kd, target;     // (joints)
+  std::vector<double> damping;            // (joints) kd and the joint's own
   bool pd = false;                        // any gain is not zero
   bool force = false;                     // any generalized force is not zero
 };

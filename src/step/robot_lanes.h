@@ -14,7 +14,7 @@ struct LaneState {
   S *q, *u;
   S* impulse;  // per support point (3), of the last solve, over its step length [N]
   // Semi-implicit integrator only.
-  S* earlier_impulse;  // the same of the solve before, where both pushed: the next may go on so
+  S* earlier_impulse;  // the same of the solve before: the next may go on so
   // Energy-safe integrator only.
   S* drift_acceleration;  // -M^-1 C(q, u) at q: predictor of the next drift
   S pending_gravity;      // time of gravity not yet in u: half the last step while in contact [s]
@@ -25,7 +25,8 @@ struct LaneState {
 template <class S>
 struct LaneControl {
   const S* generalized_force;     // (nu)
-  const S *kp, *kd, *target;      // (joints)
+  const S *kp, *target;           // (joints)
+  const S* damping;               // (joints) kd and the joint's own
   const S* friction;              // (shapes)
   const Spatial<S>* base_wrench;  // at the center of mass of body 0, world axes; null: none
   const Spatial<dynamics::Wide<S>>* wrenches;  // the same per slot

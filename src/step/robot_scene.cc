@@ -15,6 +15,24 @@ int longest_path(const dynamics::TreeLayout& layout) {
   return deepest;
 }
 
+/// Per shape, whether no joint above it moves more than one support point.
+std::unique_ptr<bool[]> find_apart(const std::vector<collide::GroundShape>& shapes,
+                                   const dynamics::TreeLayout& layout) {
+  const auto for_joints_above = [&](dynamics::LinkIndex link, auto&& f) {
+    if (link.slot == dynamics::kBaseSlot) return;
+    for (int j = layout.slots[link.slot].joint[link.lane]; j >= 0; j = layout.parent_joint[j]) f(j);
+  };
+  std::vector<int> points(layout.num_joints);  // that a joint moves
+  for (const collide::GroundShape& s : shapes)
+    for_joints_above(s.link, [&](int j) { points[j] += s.num_points; });
+  std::unique_ptr<bool[]> apart(new bool[shapes.size()]);
+  for (size_t k = 0; k < shapes.size(); ++k) {
+    apart[k] = true;
+    for_joints_above(shapes[k].link, [&](int j) { apart[k] = apart[k] && points[j] == 1; });
+  }
+  return apart;
+}
+
 /// How much of the last change of its impulse a point of each shape is expected to make again. All
 /// of it where it is the only one of its link. Of several, part of the impulse does nothing but
 /// press them against each other; it would drift for ever.
@@ -41,6 +59,7 @@ RobotScene::RobotScene(const Model& model, const dynamics::TreeLayout& layout,
       restitution_(shapes_.size()),
       threshold_(shapes_.size()),
       foresight_(foresight(shapes_)),
+      apart_(find_apart(shapes_, layout)),
       prismatic_(new bool[model.num_joints()]),
       tables_{} {
   for (size_t k = 0; k < shapes_.size(); ++k) set_law(static_cast<int>(k), {});
@@ -61,6 +80,7 @@ RobotScene::RobotScene(const Model& model, const dynamics::TreeLayout& layout,
   t.shapes = shapes_.data();
   t.restitution = restitution_.data();
   t.restitution_threshold = threshold_.data();
+  t.apart = apart_.get();
   t.foresight = foresight_.data();
   t.damping = damping_.data();
   t.prismatic = prismatic_.get();

@@ -28,7 +28,7 @@ class RobotScene {
   std::vector<collide::GroundShape> shapes_;
   std::vector<MaterialPair> laws_;
   std::vector<double> friction_, restitution_, threshold_, foresight_, damping_;
-  std::unique_ptr<bool[]> prismatic_;
+  std::unique_ptr<bool[]> apart_, prismatic_;
   RobotTables tables_;
 };
 

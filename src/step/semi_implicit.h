@@ -43,7 +43,8 @@ STICKSLIP_INLINE void compute_free_motion(RobotLanes<S>& robot, S dt) {
   dynamics::compute_free_motion(t, in);
 }
 
-/// One time step. The state of a lane only changes if its result is finite.
+/// One time step. The state of a lane only changes if its result is finite. May exchange arrays of
+/// the state with each other and with the workspace.
 template <class S>
 void step_semi_implicit(RobotLanes<S>& robot, const StepSettings& settings) {
   StageTimer timer(settings);
@@ -53,7 +54,6 @@ void step_semi_implicit(RobotLanes<S>& robot, const StepSettings& settings) {
   const S zero = constant<S>(0), dt = constant<S>(settings.time_step);
   const int offset = robot.offset(), nq = tables.nq, nu = tables.nu;
   robot.info = LaneInfo<S>{none<S>(), none<S>(), zero};
-  copy(s.impulse, 3 * tables.num_points, robot.backup.impulse);
 
   // Kinematics, bias and factor; x = L^-T dt (tau - h), the free velocity change in L-space.
   compute_free_motion(robot, dt);
@@ -75,13 +75,10 @@ void step_semi_implicit(RobotLanes<S>& robot, const StepSettings& settings) {
     contacts.build_problem(t, robot.control.friction, true);
     timer.end(kDelassus);
     contacts.start_at(s.impulse, settings.host.always ? nullptr : s.earlier_impulse, dt);
-    contacts.solve(settings, everywhere, s.impulse, dt, robot.info);
+    contacts.solve(settings, everywhere, robot.info);
     contacts.add_impulses(t, everywhere);
     timer.end(kSolve);
-  } else {
-    clear_where(everywhere, 3 * tables.num_points, s.impulse);
   }
-
   record_contacts(robot, everywhere);
 
   // u+ = u + L^-1 (x + Y^T lambda), q+ = q (+) dt u+. A zero is +0, whichever way it came about.
@@ -89,21 +86,23 @@ void step_semi_implicit(RobotLanes<S>& robot, const StepSettings& settings) {
   dynamics::solve_lower(t, base, next + offset);
   for (int k = 0; k < offset; ++k) next[k] = s.u[k] + base[k] + zero;
   for (int j = offset; j < nu; ++j) next[j] = s.u[j] + next[j] + zero;
-  copy(s.q, nq, q_new);
-  integrate_configuration(tables, q_new, next, dt);
-  for (int k = 0; k < nq; ++k) q_new[k] = q_new[k] + zero;
+  integrate_configuration(tables, s.q, next, dt, q_new);
   const Mask<S> finite = is_finite(sum_of_sizes(q_new, nq, sum_of_sizes(next, nu, zero)));
-  copy_where(finite, q_new, nq, s.q);
-  copy_where(finite, next, nu, s.u);
-  contacts.remember(finite, robot.backup.impulse, s.earlier_impulse);
-  if (!all(finite)) {
-    copy_where(!finite, robot.backup.impulse, 3 * tables.num_points, s.impulse);
+  if (all(finite)) {
+    swap(s.q, robot.q_new);
+    swap(s.u, robot.u_plus);
+  } else {
+    copy_where(finite, q_new, nq, s.q);
+    copy_where(finite, next, nu, s.u);
+    swap_where(!finite, 3 * tables.num_points, s.impulse, s.earlier_impulse);
     contacts.forget(!finite);
     record_contacts(robot, !finite, true);
     robot.info.non_finite = !finite;
     robot.info.unconverged = robot.info.unconverged & finite;
     robot.info.residual = select(finite, robot.info.residual, zero);
   }
+  contacts.write_forces(finite, dt, s.earlier_impulse);
+  swap(s.impulse, s.earlier_impulse);
   timer.end(kIntegrate);
 }
 

@@ -19,6 +19,7 @@ struct RobotTables {
   const collide::GroundShape* shapes;
   const double* restitution;            // per shape [1]
   const double* restitution_threshold;  // per shape [m/s]
+  const bool* apart;                    // per shape: no joint above it moves more than one point
   const double* foresight;              // per shape: how much of an impulse's change goes on [1]
   const double* damping;                // per joint, viscous
   bool damped;

@@ -52,7 +52,7 @@ class PackLanes {
   PackScene scene_;
   dynamics::Tree<S> tree_;
   step::RobotLanes<S> robot_;
-  S *force_, *kp_, *kd_, *target_, *friction_, *gravity_;
+  S *force_, *kp_, *damping_, *target_, *friction_, *gravity_;
   S *last_q_, *last_u_, *scratch_;
   Spatial<dynamics::Wide<S>>* wrenches_;
   Spatial<S> base_wrench_;
@@ -77,7 +77,7 @@ void PackLanes<S>::lay_out(contact::Arena& arena, const PackScene& scene) {
   s.earlier_impulse = arena.take<S>(3 * t.num_points);
   s.drift_acceleration = arena.take<S>(t.nu);
   force_ = arena.take<S>(t.nu);
-  for (S** array : {&kp_, &kd_, &target_}) *array = arena.take<S>(t.num_joints);
+  for (S** array : {&kp_, &damping_, &target_}) *array = arena.take<S>(t.num_joints);
   friction_ = arena.take<S>(t.num_shapes);
   gravity_ = arena.take<S>(3);
   last_q_ = arena.take<S>(t.nq);
@@ -86,8 +86,8 @@ void PackLanes<S>::lay_out(contact::Arena& arena, const PackScene& scene) {
   scratch_ = arena.take<S>(6 * t.num_bodies);
   contacts_ = {arena.take<S>(3 * t.num_points), arena.take<Mask<S>>(t.num_points)};
   step::LaneControl<S>& c = robot_.control;
-  c = {force_,  kp_,        kd_,  target_, friction_,       nullptr,
-       nullptr, zero3<S>(), true, false,   step::none<S>(), step::none<S>()};
+  c = {force_,  kp_,        target_, damping_, friction_,       nullptr,
+       nullptr, zero3<S>(), true,    false,    step::none<S>(), step::none<S>()};
 }
 
 template <class S>
@@ -191,7 +191,7 @@ void PackLanes<S>::load_control(const EnvArrays& arrays, long first) {
   step::LaneControl<S>& c = robot_.control;
   const S zero = constant<S>(0);
   load_parameter(arrays.kp, t.num_joints, first, kp_);
-  load_parameter(arrays.kd, t.num_joints, first, kd_);
+  load_parameter(arrays.kd, t.num_joints, first, damping_);  // kd so far
   load_parameter(arrays.friction, t.num_shapes, first, friction_);
   load_parameter(arrays.gravity, 3, first, gravity_);
   // Whatever else is not finite shows in the velocities; a friction that is none would only open
@@ -205,7 +205,9 @@ void PackLanes<S>::load_control(const EnvArrays& arrays, long first) {
   c.gravity = {gravity_[0], gravity_[1], gravity_[2]};
   const auto some = [&](S x) { return !((x >= zero) & (x <= zero)); };  // also NaN
   Mask<S> gains = step::none<S>(), forces = gains, on_base = gains, pushed = gains;
-  for (int j = 0; j < t.num_joints; ++j) gains = gains | some(kp_[j]) | some(kd_[j]);
+  for (int j = 0; j < t.num_joints; ++j) gains = gains | some(kp_[j]) | some(damping_[j]);
+  if (t.damped)
+    for (int j = 0; j < t.num_joints; ++j) damping_[j] = damping_[j] + constant<S>(t.damping[j]);
   if (arrays.force) {
     load_rows(rows(arrays.generalized_force, t.nu, first), t.nu, force_);
     repeat(force_, t.nu);
