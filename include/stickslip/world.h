@@ -40,7 +40,8 @@ struct StepSolverOptions {
   int max_sweeps = 100'000;          ///< kPerContact, kPgs
   double alpha = 1.0, alpha_min = 0.7,
          gamma = 0.99;     ///< kPerContact, kPgs (alpha only); see SolveOptions
-  bool warm_start = true;  ///< start where the impulses of the last two steps point
+  bool warm_start = true;  ///< start at the impulses of the last step; kAuto with kSemiImplicit:
+                           ///< where those of the last two point
 };
 
 /// Options of a world; fixed once it is made.

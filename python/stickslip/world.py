@@ -270,7 +270,7 @@ class World(Profiled):
         is at most 1e-8 m/s. "per_contact": the paper's sum of what each contact violates of its law [m/s]. "pgs": the paper's sum of
         impulse updates [N s] and penetration velocities [m/s].
     max_sweeps, alpha, alpha_min, gamma: of "per_contact" (and alpha of "pgs"), as in `stickslip.solve`.
-    warm_start: start each solve where the impulses of the last two steps point (the energy-safe integrator: at the last).
+    warm_start: start each solve at the last step's impulses ("auto" with "semi_implicit": where those of the last two point).
     max_substeps: "energy_safe" cuts a step into at most this many parts when bodies turn fast.
 
     ValueError names the option that is out of range.

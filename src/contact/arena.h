@@ -1,5 +1,6 @@
 // Memory for arrays, handed out from one block.
 #pragma once
+#include "lane/lane.h"
 
 namespace stickslip::contact::inline STICKSLIP_KERNELS {
 

@@ -11,22 +11,62 @@ namespace stickslip::contact::inline STICKSLIP_KERNELS {
 
 class Coupling {
  public:
-  void lay_out(Arena& arena, int dofs) {
+  void lay_out(Arena& arena, int contacts, int dofs) {
     const int words = (dofs + kBits - 1) / kBits;
     rows_ = arena.take<Word>(long(dofs) * words);
     touched_ = arena.take<Word>(words);
     lists_ = arena.take<int>(long(dofs) * dofs);
     count_ = arena.take<int>(dofs);
+    added_ = arena.take<int>(1 + long(contacts) * (1 + dofs));
+    length_ = 0;
   }
 
-  /// Nothing couples yet among m dofs.
-  void clear(int m) {
+  /// Contacts follow, which touch some of m dofs.
+  void begin(int m) {
     m_ = m;
-    words_ = (m + kBits - 1) / kBits;
-    for (int k = 0; k < m * words_; ++k) rows_[k] = 0;
+    end_ = last_ = 0;
+    same_ = true;
+    note(m);
   }
   /// A contact touches these dofs (ascending).
   void add(const int* index, int count) {
+    if (last_ && added_[last_] == count) {  // as the contact before: often, on a sole
+      int k = 0;
+      while (k < count && added_[last_ + 1 + k] == index[k]) ++k;
+      if (k == count) return;
+    }
+    last_ = end_;
+    note(count);
+    for (int k = 0; k < count; ++k) note(index[k]);
+  }
+  /// All contacts are there: makes the lists, if they are not those of the last time.
+  void complete() {
+    if (same_ && end_ == length_) return;
+    length_ = end_;
+    words_ = (m_ + kBits - 1) / kBits;
+    for (int k = 0; k < m_ * words_; ++k) rows_[k] = 0;
+    for (int at = 1; at < length_; at += 1 + added_[at]) couple(added_ + at + 1, added_[at]);
+    eliminate();
+  }
+
+  /// The dofs before j that it couples with when its turn comes, ascending.
+  const int* list(int j) const { return lists_ + j * m_; }
+  int count(int j) const { return count_[j]; }
+  /// Whether j and the two before it couple with each other and otherwise with the same dofs.
+  bool three(int j) const { return follows(j) && follows(j - 1); }
+
+ private:
+  using Word = unsigned long long;
+  static constexpr int kBits = 64;
+
+  void note(int number) {
+    same_ = same_ && end_ < length_ && added_[end_] == number;
+    added_[end_++] = number;
+  }
+  bool follows(int j) const {
+    return j > 0 && count_[j] == count_[j - 1] + 1 && list(j)[count_[j] - 1] == j - 1;
+  }
+  void couple(const int* index, int count) {
     for (int w = 0; w < words_; ++w) touched_[w] = 0;
     for (int k = 0; k < count; ++k) {
       // What is there so far comes before index[k].
@@ -36,7 +76,7 @@ class Coupling {
     }
   }
   /// Fills in what elimination couples, and writes the lists.
-  void complete() {
+  void eliminate() {
     for (int j = m_ - 1; j >= 0; --j) {
       const Word* row = rows_ + j * words_;
       int* list = lists_ + j * m_;
@@ -53,20 +93,11 @@ class Coupling {
     }
   }
 
-  /// The dofs before j that it couples with when its turn comes, ascending.
-  const int* list(int j) const { return lists_ + j * m_; }
-  int count(int j) const { return count_[j]; }
-  /// Whether j and the two before it couple with each other and otherwise with the same dofs.
-  bool three(int j) const { return follows(j) && follows(j - 1); }
-
- private:
-  using Word = unsigned long long;
-  static constexpr int kBits = 64;
-  bool follows(int j) const {
-    return j > 0 && count_[j] == count_[j - 1] + 1 && list(j)[count_[j] - 1] == j - 1;
-  }
-
   int m_ = 0, words_ = 0;
+  int* added_ = nullptr;  // m, then of each contact unlike the one before: count, dofs
+  int length_ = 0;        // of what the lists were made from
+  int end_ = 0, last_ = 0;
+  bool same_ = false;                          // so far
   Word *rows_ = nullptr, *touched_ = nullptr;  // (dofs, words): sets of dofs
   int *lists_ = nullptr, *count_ = nullptr;
 };

@@ -215,7 +215,7 @@ class FactoredProblem {
   /// Makes `coupling` that of the contacts, which are complete.
   void find_coupling() {
     if (coupled_) return;
-    coupling.clear(m_);
+    coupling.begin(m_);
     for (int i = 0; i < n_; ++i) coupling.add(contacts_[i].index, contacts_[i].count);
     coupling.complete();
     coupled_ = true;
@@ -261,7 +261,7 @@ class FactoredProblem {
     scratch = arena.take<S>(3 * wide);
     saved = arena.take<S>(15 * n);
     odd_ = arena.take<bool>(m);
-    coupling.lay_out(arena, m);
+    coupling.lay_out(arena, n, m);
     for (int i = 0; i < n; ++i) {
       int* index = arena.take<int>(m);
       Row3<S>* y = arena.take<Row3<S>>(m);

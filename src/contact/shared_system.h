@@ -224,24 +224,39 @@ STICKSLIP_INLINE void eliminate_three(FactoredProblem<S>& p, int j) {
     b[i] = madd(a[i], fb, b[i]);
     c[i] = madd(b[i], gc, madd(a[i], fc, c[i]));
   }
-  for (int k = 0; k < count; ++k) {
-    S* to = h + list[k] * stride;
-    const S ta = -(to[j] * a[j]), tb = -(madd(a[j - 1], ta, to[j - 1]) * b[j - 1]),
-            tc = -(madd(b[j - 2], tb, madd(a[j - 2], ta, to[j - 2])) * c[j - 2]);
+  // Two rows at once share the loads of the pivots'.
+  in_runs<2>(count, [&](int first, auto rows) STICKSLIP_LAMBDA {
+    constexpr int R = decltype(rows)::value;
+    S *to[R], ta[R], tb[R], tc[R];
+#pragma GCC unroll 2
+    for (int r = 0; r < R; ++r) {
+      to[r] = h + list[first + r] * stride;
+      ta[r] = -(to[r][j] * a[j]);
+      tb[r] = -(madd(a[j - 1], ta[r], to[r][j - 1]) * b[j - 1]);
+      tc[r] = -(madd(b[j - 2], tb[r], madd(a[j - 2], ta[r], to[r][j - 2])) * c[j - 2]);
+      S& y = x[list[first + r]];
+      y = madd(xc, tc[r], madd(xb, tb[r], madd(xa, ta[r], y)));
+    }
     for (int l = 0; l < count; ++l) {
       const int i = list[l];
-      to[i] = madd(c[i], tc, madd(b[i], tb, madd(a[i], ta, to[i])));
+      const S pa = a[i], pb = b[i], pc = c[i];
+#pragma GCC unroll 2
+      for (int r = 0; r < R; ++r)
+        to[r][i] = madd(pc, tc[r], madd(pb, tb[r], madd(pa, ta[r], to[r][i])));
     }
-    x[list[k]] = madd(xc, tc, madd(xb, tb, madd(xa, ta, x[list[k]])));
-  }
+  });
 }
 
 template <class S>
 STICKSLIP_STAGE void eliminate_dofs(FactoredProblem<S>& p) {
   for (int j = p.dofs() - 1; j >= 0;) {
-    const bool three = p.coupling.three(j);
-    three ? eliminate_three(p, j) : eliminate_one(p, j);
-    j -= three ? 3 : 1;
+    if (p.coupling.three(j)) {
+      eliminate_three(p, j);
+      j -= 3;
+    } else {
+      eliminate_one(p, j);
+      j -= 1;
+    }
   }
 }
 

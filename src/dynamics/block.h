@@ -107,10 +107,10 @@ STICKSLIP_INLINE ArticulatedInertia<Wide<S>> factor_block(Tree<S>& t, int slot, 
   if constexpr (N == 3) return without(all, u2, u1, u0);
 }
 
-/// x of the N joints at `slot` from the force f on the last one's link and all that hangs on it,
-/// its own apart (D11). f becomes what is passed on.
+/// x of the N joints at `slot`, times `scale`, from the force f on the last one's link and all that
+/// hangs on it, its own apart (D11). f becomes what is passed on.
 template <int N, class S>
-STICKSLIP_INLINE void solve_transposed_block(Tree<S>& t, int slot, const S* tau,
+STICKSLIP_INLINE void solve_transposed_block(Tree<S>& t, int slot, const S* tau, Wide<S> scale,
                                              Spatial<Wide<S>>& f) {
   using W = Wide<S>;
   LinkState<W>* link = t.links + slot;
@@ -124,16 +124,19 @@ STICKSLIP_INLINE void solve_transposed_block(Tree<S>& t, int slot, const S* tau,
   if constexpr (N > 1) x1 = on_joint(1);
   x0 = on_joint(0);
   if constexpr (N > 2) {
-    link[2].x = x2 = x2 * link[2].inv_root;
+    x2 = x2 * link[2].inv_root;
+    link[2].x = x2 * scale;
     x1 = nmadd(link[2].inner[0], x2, x1), x0 = nmadd(link[2].inner[1], x2, x0);
     f = nmadd(link[2].arm, x2, f);
   }
   if constexpr (N > 1) {
-    link[1].x = x1 = x1 * link[1].inv_root;
+    x1 = x1 * link[1].inv_root;
+    link[1].x = x1 * scale;
     x0 = nmadd(link[1].inner[0], x1, x0);
     f = nmadd(link[1].arm, x1, f);
   }
-  link[0].x = x0 = x0 * link[0].inv_root;
+  x0 = x0 * link[0].inv_root;
+  link[0].x = x0 * scale;
   f = nmadd(link[0].arm, x0, f);
 }
 

@@ -37,6 +37,7 @@ struct WalkInput {
   // At the centers of mass, world axes: of body 0 and per slot; both or none.
   const Spatial<S>* base_wrench = nullptr;
   const Spatial<Wide<S>>* wrenches = nullptr;
+  double scale = 1;  // of x, x = L^-T (scale forces)
 };
 
 template <unsigned kParts, class S>
@@ -157,13 +158,14 @@ void chain_factor(Tree<S>& t, const Bundle& b, const S* diagonal) {
 }
 
 template <class S>
-void chain_solve_transposed(Tree<S>& t, const Bundle& b, const S* tau, Spatial<S>& on_base) {
+void chain_solve_transposed(Tree<S>& t, const Bundle& b, const S* tau, double scale,
+                            Spatial<S>& on_base) {
   using W = Wide<S>;
   Spatial<W> f = zero_spatial<W>();
   if (b.has_children) f = t.links[b.first_slot + b.length - 1].force_from_children;
   for (int slot = b.first_slot + b.length; slot > b.first_slot;)
     next_block_inward(b, slot, [&](int first, auto n) STICKSLIP_LAMBDA {
-      solve_transposed_block<decltype(n)::value>(t, first, tau, f);
+      solve_transposed_block<decltype(n)::value>(t, first, tau, constant<W>(scale), f);
     });
   add_to_parents<S, Spatial>(t, b, f, on_base, &LinkState<W>::force_from_children);
 }
@@ -191,7 +193,7 @@ template <unsigned kParts, class S>
 STICKSLIP_INLINE void walk_inward(Tree<S>& t, const Bundle& b, const WalkInput<S>& in,
                                   Spatial<S>& on_base) {
   if constexpr (kParts & kFactor) chain_factor(t, b, in.diagonal);
-  if constexpr (kParts & kSolveTransposed) chain_solve_transposed(t, b, in.tau, on_base);
+  if constexpr (kParts & kSolveTransposed) chain_solve_transposed(t, b, in.tau, in.scale, on_base);
 }
 
 /// The sums over the chains that hang on a link start at zero.
@@ -231,7 +233,7 @@ void walk(Tree<S>& t, const WalkInput<S>& in) {
     if constexpr (kParts & kFactor)
       if (t.floating) factor_base(t.base);
     if constexpr (kParts & kSolveTransposed) {
-      to_rows(on_base, t.base.x);
+      to_rows(on_base * constant<S>(in.scale), t.base.x);
       if (t.floating) solve_base_transposed(t.base, t.base.x);
     }
   } else if constexpr (kParts & kMultiply) {

@@ -64,9 +64,11 @@ class ContactStage {
   /// Rows and the factored problem; friction per shape. `with_x`: free velocities come from J u + Y
   /// x with the tree's x; otherwise from J u.
   void build_problem(dynamics::Tree<S>& tree, const S* friction, bool with_x);
-  /// Where the solve starts: at the forces of the last one (3 per support point), impulse = force *
-  /// h. Given those of the one `earlier`, their change goes on where a point pushed both times.
+  /// Where the solve starts, to be called before it: at the forces of the last one (3 per support
+  /// point), impulse = force * h, or at zero if there are none. Given those of the one `earlier`,
+  /// their change goes on where a point pushed both times.
   void start_at(const S* last, const S* earlier, S h);
+  /// Solves, in these lanes; what it took goes to `info`.
   void solve(const StepSettings& settings, Mask<S> live, LaneInfo<S>& info);
   /// The solution as forces of all points, for the lanes that were live: impulse = force * h.
   void write_forces(Mask<S> live, S h, S* forces) const;
@@ -98,6 +100,9 @@ class ContactStage {
   static int flat(dynamics::LinkIndex link) { return link.slot * kLanes + link.lane; }
   int links() const { return tables_->num_slots * kLanes; }
 
+  /// Number of a link's joint among the shared dofs; -1: private in all lanes.
+  int shared_dof(dynamics::LinkIndex link) const { return num_shared_ ? dof_[flat(link)] : -1; }
+
   void add(int shape, int point, const Vec3<S>& position, S gap, Mask<S> active);
   /// Takes the points lower than `reach` above the ground.
   void detect_within(const dynamics::Tree<S>& tree, S clearance, S reach, Mask<S> live);
@@ -119,9 +124,6 @@ class ContactStage {
   collide::PlacedShape<S>* placed_;
   ActiveContact<S>* active_;
   int count_ = 0;
-  /// Number of a link's joint among the shared dofs; -1: private in all lanes.
-  int shared_dof(dynamics::LinkIndex link) const { return num_shared_ ? dof_[flat(link)] : -1; }
-
   // Joints above active contacts, per slot and lane of a bundle; unset where there are no shared
   // dofs.
   Mask<S>*once_, *shared_;  // lanes where one contact, two or more of them are below

@@ -334,27 +334,26 @@ contact::FactoredOptions solver_options(const StepSettings& settings) {
 
 template <class S>
 void ContactStage<S>::start_at(const S* last, const S* earlier, S h) {
+  const S zero = constant<S>(0);
   for (int i = 0; i < count_; ++i) {
     const int at = 3 * active_[i].id;
-    S f[3] = {last[at], last[at + 1], last[at + 2]};
-    if (earlier) {
+    S* impulse = problem_.impulse(i);
+    for (int r = 0; r < 3; ++r) impulse[r] = last ? last[at + r] : zero;
+    if (last && earlier) {
       const S part = constant<S>(tables_->foresight[active_[i].shape]);
-      const Mask<S> pushed = (f[2] > constant<S>(0)) & (earlier[at + 2] > constant<S>(0));
+      const Mask<S> pushed = (last[at + 2] > zero) & (earlier[at + 2] > zero);
       for (int r = 0; r < 3; ++r)
-        f[r] = select(pushed, madd(part, f[r] - earlier[at + r], f[r]), f[r]);
+        impulse[r] =
+            select(pushed, madd(part, impulse[r] - earlier[at + r], impulse[r]), impulse[r]);
     }
-    for (int r = 0; r < 3; ++r) problem_.impulse(i)[r] = f[r] * h;
+    for (int r = 0; r < 3; ++r) impulse[r] = impulse[r] * h;
   }
 }
 
 template <class S>
 void ContactStage<S>::solve(const StepSettings& settings, Mask<S> live, LaneInfo<S>& info) {
   const S zero = constant<S>(0);
-  for (int i = 0; i < count_; ++i) {
-    problem_.active(i) = active_[i].active & live;
-    if (!settings.warm_start)
-      for (int r = 0; r < 3; ++r) problem_.impulse(i)[r] = zero;
-  }
+  for (int i = 0; i < count_; ++i) problem_.active(i) = active_[i].active & live;
   if (settings.host.always) {
     solve_by_method(settings.host, info);
   } else {

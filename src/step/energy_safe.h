@@ -245,7 +245,7 @@ class EnergySafeStep {
     c.build_problem(t_, robot_.control.friction, false);
     timer_.end(kDelassus);
     const LaneInfo<S> before = robot_.info;
-    c.start_at(state().impulse, nullptr, h);
+    c.start_at(settings_.warm_start ? state().impulse : nullptr, nullptr, h);
     c.solve(settings_, live, robot_.info);
     c.write_forces(live, h, state().impulse);
     robot_.info.residual = max(before.residual, robot_.info.residual);

@@ -15,37 +15,38 @@ int longest_path(const dynamics::TreeLayout& layout) {
   return deepest;
 }
 
+template <class F>
+void for_joints_above(const dynamics::TreeLayout& layout, dynamics::LinkIndex link, const F& f) {
+  if (link.slot == dynamics::kBaseSlot) return;
+  for (int j = layout.slots[link.slot].joint[link.lane]; j >= 0; j = layout.parent_joint[j]) f(j);
+}
+
 /// Per shape, whether no joint above it moves more than one support point.
 std::unique_ptr<bool[]> find_apart(const std::vector<collide::GroundShape>& shapes,
                                    const dynamics::TreeLayout& layout) {
-  const auto for_joints_above = [&](dynamics::LinkIndex link, auto&& f) {
-    if (link.slot == dynamics::kBaseSlot) return;
-    for (int j = layout.slots[link.slot].joint[link.lane]; j >= 0; j = layout.parent_joint[j]) f(j);
-  };
   std::vector<int> points(layout.num_joints);  // that a joint moves
   for (const collide::GroundShape& s : shapes)
-    for_joints_above(s.link, [&](int j) { points[j] += s.num_points; });
+    for_joints_above(layout, s.link, [&](int j) { points[j] += s.num_points; });
   std::unique_ptr<bool[]> apart(new bool[shapes.size()]);
   for (size_t k = 0; k < shapes.size(); ++k) {
     apart[k] = true;
-    for_joints_above(shapes[k].link, [&](int j) { apart[k] = apart[k] && points[j] == 1; });
+    for_joints_above(layout, shapes[k].link, [&](int j) { apart[k] = apart[k] && points[j] == 1; });
   }
   return apart;
 }
 
-/// How much of the last change of its impulse a point of each shape is expected to make again. All
-/// of it where it is the only one of its link. Of several, part of the impulse does nothing but
-/// press them against each other; it would drift for ever.
-std::vector<double> foresight(const std::vector<collide::GroundShape>& shapes) {
-  const auto points_of_link = [&](const dynamics::LinkIndex& link) {
-    int points = 0;
-    for (const collide::GroundShape& s : shapes)
-      if (s.link.slot == link.slot && s.link.lane == link.lane) points += s.num_points;
-    return points;
-  };
+/// How much of the last change of its impulse a point of each shape is expected to make again
+/// (docs/theory/solvers.md (C26a)): nearly all of it where three joints or more are its own, and so
+/// its impulse is determined. Elsewhere part of the impulses may only press the points against each
+/// other. No solve damps that part, this factor has to.
+std::vector<double> foresight(const std::vector<collide::GroundShape>& shapes,
+                              const dynamics::TreeLayout& layout, const bool* apart) {
   std::vector<double> part;
-  for (const collide::GroundShape& s : shapes)
-    part.push_back(points_of_link(s.link) > 1 ? 0.9 : 1.0);
+  for (size_t k = 0; k < shapes.size(); ++k) {
+    int joints = 0;
+    for_joints_above(layout, shapes[k].link, [&](int) { ++joints; });
+    part.push_back(apart[k] && joints >= 3 ? 0.98 : 0.9);
+  }
   return part;
 }
 
@@ -58,8 +59,8 @@ RobotScene::RobotScene(const Model& model, const dynamics::TreeLayout& layout,
       friction_(shapes_.size()),
       restitution_(shapes_.size()),
       threshold_(shapes_.size()),
-      foresight_(foresight(shapes_)),
       apart_(find_apart(shapes_, layout)),
+      foresight_(foresight(shapes_, layout, apart_.get())),
       prismatic_(new bool[model.num_joints()]),
       tables_{} {
   for (size_t k = 0; k < shapes_.size(); ++k) set_law(static_cast<int>(k), {});

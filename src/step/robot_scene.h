@@ -27,8 +27,10 @@ class RobotScene {
  private:
   std::vector<collide::GroundShape> shapes_;
   std::vector<MaterialPair> laws_;
-  std::vector<double> friction_, restitution_, threshold_, foresight_, damping_;
-  std::unique_ptr<bool[]> apart_, prismatic_;
+  std::vector<double> friction_, restitution_, threshold_, damping_;
+  std::unique_ptr<bool[]> apart_;
+  std::vector<double> foresight_;
+  std::unique_ptr<bool[]> prismatic_;
   RobotTables tables_;
 };
 

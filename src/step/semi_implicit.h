@@ -11,17 +11,11 @@
 
 namespace stickslip::step::inline STICKSLIP_KERNELS {
 
-/// x <- dt x for all of L-space.
+/// Kinematics, bias and factor at q, and x = L^-T dt (tau - h), the free velocity change in
+/// L-space.
 template <class S>
-STICKSLIP_INLINE void scale_x(dynamics::Tree<S>& t, double dt) {
-  for (S& x : t.base.x) x = x * constant<S>(dt);
-  for (int slot = 0; slot < t.num_slots; ++slot)
-    t.links[slot].x = t.links[slot].x * constant<dynamics::Wide<S>>(dt);
-}
-
-/// Kinematics, bias and factor at q, and x = L^-T (tau - h).
-template <class S>
-STICKSLIP_INLINE void compute_free_motion(RobotLanes<S>& robot, S dt) {
+STICKSLIP_INLINE void compute_free_motion(RobotLanes<S>& robot, double time_step) {
+  const S dt = constant<S>(time_step);
   const RobotTables& tables = *robot.tables;
   const S *q = robot.state.q, *u = robot.state.u;
   dynamics::Tree<S>& t = *robot.tree;
@@ -40,6 +34,7 @@ STICKSLIP_INLINE void compute_free_motion(RobotLanes<S>& robot, S dt) {
   in.base_force = driven ? &on_base : nullptr;
   in.base_wrench = robot.control.base_wrench;
   in.wrenches = robot.control.wrenches;
+  in.scale = time_step;
   dynamics::compute_free_motion(t, in);
 }
 
@@ -55,9 +50,7 @@ void step_semi_implicit(RobotLanes<S>& robot, const StepSettings& settings) {
   const int offset = robot.offset(), nq = tables.nq, nu = tables.nu;
   robot.info = LaneInfo<S>{none<S>(), none<S>(), zero};
 
-  // Kinematics, bias and factor; x = L^-T dt (tau - h), the free velocity change in L-space.
-  compute_free_motion(robot, dt);
-  scale_x(t, settings.time_step);
+  compute_free_motion(robot, settings.time_step);
   timer.end(kDynamics);
 
   // Contacts: overlapping points only.
@@ -74,7 +67,9 @@ void step_semi_implicit(RobotLanes<S>& robot, const StepSettings& settings) {
   if (contacts.count() > 0) {
     contacts.build_problem(t, robot.control.friction, true);
     timer.end(kDelassus);
-    contacts.start_at(s.impulse, settings.host.always ? nullptr : s.earlier_impulse, dt);
+    // The methods of the paper start at the last impulses.
+    contacts.start_at(settings.warm_start ? s.impulse : nullptr,
+                      settings.host.always ? nullptr : s.earlier_impulse, dt);
     contacts.solve(settings, everywhere, robot.info);
     contacts.add_impulses(t, everywhere);
     timer.end(kSolve);

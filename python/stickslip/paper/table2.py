@@ -131,7 +131,7 @@ def _sentences(data: dict) -> list[str]:
     out = [
         f"Processor time of one core over {count(data['timed_steps'])} steps per task, scaled; medians of interleaved "
         "runs. Bisection and PGS have the paper's settings (α = 1 decaying to 0.7 with γ = 0.99; α = 0.6; each with its own stopping "
-        "test at 10<sup>−6</sup>) and step by semi-implicit Euler at 1 ms; all start from the impulses of the last step. Ours solve Coulomb's law (eq. 6) to a residual of "
+        "test at 10<sup>−6</sup>) and step by semi-implicit Euler at 1 ms; both start from the impulses of the last step, ours where those of the last two point. Ours solve Coulomb's law (eq. 6) to a residual of "
         "10<sup>−9</sup> m/s plus 10<sup>−8</sup> of the contact speed."
     ]
     all_fewer = [TASKS[t].lower() for t in TASKS if fewer[t] > 1]

@@ -266,6 +266,24 @@ void compare_lanes_with_double() {
 
 }  // namespace
 
+TEST(AScaleOfTheForcesScalesWhatIsSolved) {
+  // A power of two: not a bit is lost.
+  constexpr double kScale = 1.0 / 1024;
+  for (const ModelPtr& model : robots()) {
+    Robots<double> whole(*model, {random_state(*model, 5)}),
+        part(*model, {random_state(*model, 5)});
+    WalkInput<double> in = whole.input();
+    compute_free_motion(whole.t, in);
+    in.scale = kScale;
+    compute_free_motion(part.t, in);
+    for (int k = 0; k < 6; ++k) CHECK(part.t.base.x[k] == kScale * whole.t.base.x[k]);
+    for (int slot = 0; slot < whole.t.num_slots; ++slot)
+      for (int lane = 0; lane < kMaxLanes; ++lane)
+        CHECK(get_lane(part.t.links[slot].x, lane) ==
+              kScale * get_lane(whole.t.links[slot].x, lane));
+  }
+}
+
 TEST(DoublePacksEqualDoubleBitForBit) {
   compare_lanes_with_double<Pack<double, 4>>();
   compare_lanes_with_double<Pack<double, 8>>();
