@@ -3,12 +3,12 @@
 // impulse found, its residual, and whether it is good enough.
 //
 // Rule between sweeps and Newton steps, per lane: with e_k the largest velocity change of sweep k,
-// e_k^2 / e_(k-1) is what the next one is expected to change. Where that is above the tolerance,
-// and always from the fifth sweep on, a Newton step comes before the next sweep; else it is swept
-// again. Or, with `foresee`, not at all, if no Newton step lay between the last two sweeps: the
-// lane stops, and goes on only if the certificate says that it should have. Maximum dissipation
-// ([Hwangbo 2018] eq. 8) is not a complementarity problem in the velocity, so the Newton finish and
-// the fallback do not apply: it sweeps to the end, and its residual is |G_ii (lambda_i - local_i)|.
+// e_k^2 / e_(k-1) is what the next one is expected to change. Where that is above the tolerance, a
+// Newton step comes before the next sweep; else it is swept again. Or, with `foresee`, not at all,
+// if no Newton step lay between the last two sweeps: the lane stops, and goes on only if the
+// certificate says that it should have. Maximum dissipation ([Hwangbo 2018] eq. 8) is not a
+// complementarity problem in the velocity, so the Newton finish and the fallback do not apply: it
+// sweeps to the end, and its residual is |G_ii (lambda_i - local_i)|.
 #pragma once
 #include "contact/jam.h"
 #include "contact/one_lane.h"
@@ -47,7 +47,7 @@ FactoredOptions default_options() {
     // creep where robots hang and slide. What is not solved after twelve sweeps seldom is (measured
     // on the tasks of benchmarks/compare and benchmarks/micro/lane_kernels.cc).
     o.alpha = 5e-5;
-    o.alpha_again = 5e-4;
+    o.alpha_again = 1e-3;
     o.alpha_late = 5e-3;
     o.late = 5;
     o.max_sweeps = 12;
@@ -151,7 +151,6 @@ STICKSLIP_STAGE Mask<S> iterate(FactoredProblem<S>& p, Mask<S> live, S tolerance
     }
     if (!any(live) || k >= cap) return foreseen;
     if (!kMaxDissipation && k >= 2) {
-      if (k >= 5) slow = live;
       if (any(slow)) {
         const double alpha = k >= o.late ? o.alpha_late : k > 2 ? o.alpha_again : o.alpha;
         newton_step<M>(p, slow, constant<S>(alpha));
