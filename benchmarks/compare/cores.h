@@ -2,6 +2,10 @@
 #pragma once
 #include <sched.h>
 
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+
 namespace stickslip::benchmarks {
 
 /// Pins this thread, and threads it makes from now on, to a core; -2: core 1 where there is one,
@@ -18,6 +22,24 @@ class UseAllCores {
 
  private:
   cpu_set_t before_;
+};
+
+/// As long as one lives, this thread moves on to the next of those cores every few milliseconds: it
+/// has their mean speed, as the threads have that it is compared with. On a shared machine the
+/// cores differ, and not always in the same way.
+class TakeTurns {
+ public:
+  TakeTurns();
+  ~TakeTurns();
+  TakeTurns(const TakeTurns&) = delete;
+  TakeTurns& operator=(const TakeTurns&) = delete;
+
+ private:
+  cpu_set_t before_;
+  std::mutex mutex_;
+  std::condition_variable end_;
+  bool over_ = false;
+  std::thread mover_;
 };
 
 }  // namespace stickslip::benchmarks

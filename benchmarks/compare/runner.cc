@@ -40,7 +40,7 @@ template <class T>
 class BatchRunner : public Runner {
  public:
   BatchRunner(const EngineChoice& choice, const Scenario& s, const Settings& settings)
-      : several_(choice.threads > 1),
+      : threads_(choice.threads),
         robots_(settings.robots * (choice.wall_clock() ? Settings::kLargeBatch : 1)),
         steps_(std::max(kTick, settings.steps * Settings::kBatchWork / robots_ / kTick * kTick)) {
     const auto cores = all_cores();  // its threads inherit them
@@ -50,6 +50,7 @@ class BatchRunner : public Runner {
   void prepare() override { engine_->prepare(steps_); }
   void run() override {
     const auto cores = all_cores();
+    const auto turns = threads_ == 1 ? std::make_unique<TakeTurns>() : nullptr;
     NoObserver nobody;
     engine_->run(steps_, nobody);
   }
@@ -67,10 +68,10 @@ class BatchRunner : public Runner {
 
  private:
   std::unique_ptr<UseAllCores> all_cores() const {
-    return several_ ? std::make_unique<UseAllCores>() : nullptr;
+    return threads_ > 1 ? std::make_unique<UseAllCores>() : nullptr;
   }
 
-  bool several_;  // threads
+  int threads_;  // 0: one, on the core of everybody else
   int robots_;
   long steps_;
   std::optional<BatchEngine<T>> engine_;

@@ -10,8 +10,7 @@ namespace stickslip::collide::inline STICKSLIP_KERNELS {
 template <class S>
 struct PlacedShape {
   Vec3<S> center;
-  S lowest;      // height of its lowest point above the base origin, never too high
-  Mat3<S> axes;  // see orient; a sphere has none
+  Mat3<S> axes;  // a sphere has none
 };
 
 template <class S>
@@ -42,35 +41,37 @@ STICKSLIP_INLINE Mat3<S> shape_rotation(const GroundShape& shape) {
   return axes;
 }
 
-/// Center and lowest point, which is all that a shape far from the ground needs.
+/// Height of the lowest point of a shape above the base origin, never too high: all that a shape
+/// far from the ground needs.
+template <class S>
+STICKSLIP_INLINE S lowest_point(const dynamics::Tree<S>& tree, const GroundShape& shape) {
+  const Mat3<S> rotation = link_rotation(tree, shape);
+  const Vec3<S> up{rotation.m[6], rotation.m[7], rotation.m[8]};  // heights of the link's axes
+  const Vec3<S> c = constant3<S>(shape.center);
+  const S origin = shape.link.slot == dynamics::kBaseSlot
+                       ? constant<S>(0)
+                       : dynamics::field_of<S, Vec3>(
+                             tree, shape.link, &dynamics::LinkState<dynamics::Wide<S>>::position)
+                             .z;
+  const S center = madd(up.z, c.z, madd(up.y, c.y, madd(up.x, c.x, origin)));
+  if (shape.type == ShapeType::kSphere) return center - constant<S>(shape.radius);
+  const Mat3<S> axes = shape_rotation<S>(shape);
+  const auto reach = [&](int k) {
+    return abs(dot(up, column(axes, k))) * constant<S>(shape.half[k]);
+  };
+  if (shape.type == ShapeType::kBox) return center - (reach(0) + reach(1) + reach(2));
+  // A capsule; a cylinder lies inside the capsule-like bound radius + half length * |axis|.
+  return center - (constant<S>(shape.half[0]) + reach(2));
+}
+
+/// Center and axes, for `support_point`.
 template <class S>
 PlacedShape<S> place(const dynamics::Tree<S>& tree, const GroundShape& shape) {
   PlacedShape<S> p;
   p.center = shape_center(tree, shape);
-  if (shape.type == ShapeType::kSphere) {
-    p.lowest = p.center.z - constant<S>(shape.radius);
-    return p;
-  }
-  // Heights of the tips of the axes: a row of their matrix.
-  const Mat3<S> r = link_rotation(tree, shape), axes = shape_rotation<S>(shape);
-  const auto height = [&](int k) {
-    return abs(dot(Vec3<S>{r.m[6], r.m[7], r.m[8]}, column(axes, k)));
-  };
-  const S x = height(0), y = height(1), z = height(2);
-  const Vec3<S> half = constant3<S>(shape.half);
-  if (shape.type == ShapeType::kBox)
-    p.lowest = p.center.z - (x * half.x + y * half.y + z * half.z);
-  else  // capsule; a cylinder lies inside the capsule-like bound radius + half length * |axis|
-    p.lowest = p.center.z - (half.x + z * half.z);
-  return p;
-}
-
-/// Adds the axes, for `support_point`.
-template <class S>
-STICKSLIP_INLINE void orient(const dynamics::Tree<S>& tree, const GroundShape& shape,
-                             PlacedShape<S>& p) {
   if (shape.type != ShapeType::kSphere)
     p.axes = link_rotation(tree, shape) * shape_rotation<S>(shape);
+  return p;
 }
 
 /// Center of support point `point` of a cylinder: cap = point / 4, rim direction = point % 4.

@@ -61,18 +61,40 @@ STICKSLIP_INLINE Chunk<S> madd_chunk(const Chunk<S>& a, S b, const Chunk<S>& c) 
 }
 constexpr int round_up(int n, int k) { return (n + k - 1) / k * k; }
 
-/// A symmetric 3x3 matrix whose columns are needed.
+/// A symmetric 3x3 matrix whose columns are needed: for a plain scalar one register each, for a
+/// pack its six numbers.
 template <class S, bool kPlain = ScalarTraits<S>::kWidth == 1>
 struct Symmetric3 {
   S xx, xy, xz, yy, yz, zz;
   STICKSLIP_INLINE Row3<S> column(int r) const {
     return r == 0 ? Row3<S>{xx, xy, xz} : r == 1 ? Row3<S>{xy, yy, yz} : Row3<S>{xz, yz, zz};
   }
+  /// += row row^T
+  STICKSLIP_INLINE void add_square(const Row3<S>& row) {
+    const S &x = row.x, &y = row.y, &z = row.z;
+    xx = madd(x, x, xx), xy = madd(x, y, xy), xz = madd(x, z, xz);
+    yy = madd(y, y, yy), yz = madd(y, z, yz), zz = madd(z, z, zz);
+  }
+  /// xx xy xz yy yz zz
+  STICKSLIP_INLINE void store_to(S block[6]) const {
+    block[0] = xx, block[1] = xy, block[2] = xz, block[3] = yy, block[4] = yz, block[5] = zz;
+  }
 };
 template <class S>
 struct Symmetric3<S, true> {
   Row3<S> columns[3];
   STICKSLIP_INLINE const Row3<S>& column(int r) const { return columns[r]; }
+  STICKSLIP_INLINE void add_square(const Row3<S>& row) {
+    S numbers[3];
+    store(row, numbers);
+    for (int r = 0; r < 3; ++r) columns[r] = madd(row, numbers[r], columns[r]);
+  }
+  STICKSLIP_INLINE void store_to(S block[6]) const {
+    S rows[3][3];
+    for (int r = 0; r < 3; ++r) store(columns[r], rows[r]);
+    for (int r = 0, k = 0; r < 3; ++r)
+      for (int c = r; c < 3; ++c, ++k) block[k] = rows[r][c];
+  }
 };
 template <class S>
 STICKSLIP_INLINE Symmetric3<S> make_symmetric(S xx, S xy, S xz, S yy, S yz, S zz) {
@@ -80,6 +102,12 @@ STICKSLIP_INLINE Symmetric3<S> make_symmetric(S xx, S xy, S xz, S yy, S yz, S zz
     return {{make_row3(xx, xy, xz), make_row3(xy, yy, yz), make_row3(xz, yz, zz)}};
   else
     return {xx, xy, xz, yy, yz, zz};
+}
+
+template <class S>
+STICKSLIP_INLINE Symmetric3<S> zero_symmetric() {
+  const S o = constant<S>(0);
+  return make_symmetric(o, o, o, o, o, o);
 }
 
 /// One contact of a factored problem. The owner fills the inputs; `prepare_contact` the rest.
@@ -169,9 +197,10 @@ class FactoredProblem {
     identity_ = true;
     coupled_ = false;
     for (int k = 0; k < padded(m); ++k) w0[k] = constant<S>(0);
-    for (int k = 0; k < m; ++k) {
-      odd_[k] = odd ? odd[k] : k & 1;
-      identity_ = identity_ && odd_[k] == (k & 1);
+    odd_ = odd ? given_ : alternating_;
+    for (int k = 0; odd && k < m; ++k) {
+      given_[k] = odd[k];
+      identity_ = identity_ && odd[k] == (k & 1);
     }
   }
   /// Adds a contact that touches all shared dofs; its number. The caller sets what else it is.
@@ -237,7 +266,7 @@ class FactoredProblem {
   /// Every contact touches all of exactly six dofs (one floating base): the unrolled case.
   bool six() const { return identity_ && m_ == 6; }
   FactoredCapacity capacity() const { return capacity_; }
-  static int padded(int m) { return round_up(m + 1, 4) + 4; }
+  static constexpr int padded(int m) { return round_up(m + 1, 4) + 4; }
   int stride() const { return padded(m_); }
 
   S* w0 = nullptr;       // (m) in
@@ -260,7 +289,9 @@ class FactoredProblem {
     matrix = arena.take<S>(long(m) * wide + 8);
     scratch = arena.take<S>(3 * wide);
     saved = arena.take<S>(15 * n);
-    odd_ = arena.take<bool>(m);
+    given_ = arena.take<bool>(m);
+    alternating_ = arena.take<bool>(m);
+    for (int k = 0; memory && k < m; ++k) alternating_[k] = k & 1;
     coupling.lay_out(arena, n, m);
     for (int i = 0; i < n; ++i) {
       int* index = arena.take<int>(m);
@@ -290,7 +321,8 @@ class FactoredProblem {
   FactoredContact<S>* contacts_ = nullptr;
   FactoredCapacity capacity_;
   int n_ = 0, m_ = 0;
-  bool* odd_ = nullptr;
+  bool *given_ = nullptr, *alternating_ = nullptr;
+  const bool* odd_ = nullptr;  // one of the two
   bool identity_ = true;
   bool coupled_ = false;
 };

@@ -78,26 +78,9 @@ STICKSLIP_INLINE void clear_inactive(FactoredContact<S>& c) {
 /// Y Y^T.
 template <int M, class S>
 STICKSLIP_INLINE Symmetric3<S> gram(const FactoredContact<S>& c) {
-  const S zero = constant<S>(0);
-  const int n = M == 6 ? 6 : c.count;
-  if constexpr (ScalarTraits<S>::kWidth == 1) {
-    Row3<S> d[3];
-    for (int r = 0; r < 3; ++r) d[r] = make_row3(zero, zero, zero);
-    for (int k = 0; k < n; ++k) {
-      S y[3];
-      store(c.y[k], y);
-      for (int r = 0; r < 3; ++r) d[r] = madd(c.y[k], y[r], d[r]);
-    }
-    return {{d[0], d[1], d[2]}};
-  } else {
-    Symmetric3<S> g = {zero, zero, zero, zero, zero, zero};
-    for (int k = 0; k < n; ++k) {
-      const Row3<S>& y = c.y[k];
-      g.xx = madd(y.x, y.x, g.xx), g.xy = madd(y.x, y.y, g.xy), g.xz = madd(y.x, y.z, g.xz);
-      g.yy = madd(y.y, y.y, g.yy), g.yz = madd(y.y, y.z, g.yz), g.zz = madd(y.z, y.z, g.zz);
-    }
-    return g;
-  }
+  Symmetric3<S> g = zero_symmetric<S>();
+  for (int k = 0; k < (M == 6 ? 6 : c.count); ++k) g.add_square(c.y[k]);
+  return g;
 }
 
 /// Blocks of one contact from its rows, and its warm start (brought back into the cone).
@@ -107,10 +90,8 @@ STICKSLIP_STAGE void prepare_contact(FactoredContact<S>& c) {
   clear_inactive<M>(c);
   transpose_rows<M>(c);
   c.shared = gram<M>(c);
-  S column[3][3];
-  for (int r = 0; r < 3; ++r) store(c.shared.column(r), column[r]);
-  const S shared[6] = {column[0][0], column[0][1], column[0][2],
-                       column[1][1], column[1][2], column[2][2]};
+  S shared[6];
+  c.shared.store_to(shared);
   LocalContact<S>& k = c.local;
   const S* p = c.private_block;
   k.xx = shared[0] + p[0], k.xy = shared[1] + p[1], k.xz = shared[2] + p[2];
@@ -199,12 +180,17 @@ STICKSLIP_STAGE S sweep(FactoredProblem<S>& p, Mask<S> live, S speed) {
 /// w = w0 + sum Y^T lambda.
 template <int M, class S>
 STICKSLIP_STAGE void accumulate(FactoredProblem<S>& p) {
-  for (int k = 0; k < p.stride(); k += kChunk<S>) store_chunk(p.w + k, load_chunk(p.w0 + k));
+  S own[FactoredProblem<S>::padded(M)];  // nobody else's, so that six stay in registers
+  S* w = M > 0 ? own : p.w;
+  const int end = M > 0 ? FactoredProblem<S>::padded(M) : p.stride();
+  for (int k = 0; k < end; k += kChunk<S>) store_chunk(w + k, load_chunk(p.w0 + k));
   for (int i = 0; i < p.size(); ++i) {
     S l[3];
     store(p.contact(i).lambda, l);
-    add_transposed<M>(p.contact(i), l, p.w);
+    add_transposed<M>(p.contact(i), l, w);
   }
+  if (M > 0)
+    for (int k = 0; k < end; k += kChunk<S>) store_chunk(p.w + k, load_chunk(w + k));
 }
 
 /// Puts impulses in place without touching w (`accumulate` follows).

@@ -121,7 +121,6 @@ class ContactStage {
                       LaneInfo<S>& info);
 
   const RobotTables* tables_;
-  collide::PlacedShape<S>* placed_;
   ActiveContact<S>* active_;
   int count_ = 0;
   // Joints above active contacts, per slot and lane of a bundle; unset where there are no shared
@@ -131,7 +130,7 @@ class ContactStage {
   dynamics::LinkIndex* link_of_dof_;
   int num_shared_ = 0;
   int* index_;
-  bool* odd_;  // parity of the depth of each shared dof
+  bool* odd_;  // parity of each dof of the base and of the depth of each shared joint
   contact::FactoredProblem<S> problem_;
   OverlapCorrection<S> overlap_;
   double* dense_;  // a problem for the host

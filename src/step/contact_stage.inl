@@ -9,7 +9,6 @@ template <class S>
 void ContactStage<S>::lay_out(contact::Arena& arena, const RobotTables& tables) {
   tables_ = &tables;
   const int points = tables.num_points, dofs = tables.num_joints + 6;
-  placed_ = arena.take<collide::PlacedShape<S>>(tables.num_shapes);
   active_ = arena.take<ActiveContact<S>>(points);
   once_ = arena.take<Mask<S>>(links());
   shared_ = arena.take<Mask<S>>(links());
@@ -17,6 +16,7 @@ void ContactStage<S>::lay_out(contact::Arena& arena, const RobotTables& tables) 
   link_of_dof_ = arena.take<dynamics::LinkIndex>(tables.num_joints);
   index_ = arena.take<int>(dofs);
   odd_ = arena.take<bool>(dofs);
+  for (int k = 0; odd_ && k < 6; ++k) odd_[k] = k & 1;
   for (int i = 0; i < points; ++i) {
     auto* path = arena.take<dynamics::LinkIndex>(tables.max_depth);
     auto* joint = arena.take<Row3<S>>(tables.max_depth);
@@ -62,12 +62,11 @@ void ContactStage<S>::detect_within(const dynamics::Tree<S>& tree, S clearance, 
   count_ = 0;
   for (int s = 0; s < tables_->num_shapes; ++s) {
     const collide::GroundShape& shape = tables_->shapes[s];
-    placed_[s] = collide::place(tree, shape);
-    const Mask<S> near = live & (placed_[s].lowest + clearance < reach);
+    const Mask<S> near = live & (collide::lowest_point(tree, shape) + clearance < reach);
     if (!any(near)) continue;
-    collide::orient(tree, shape, placed_[s]);
+    const collide::PlacedShape<S> placed = collide::place(tree, shape);
     for (int k = 0; k < shape.num_points; ++k) {
-      const Vec3<S> p = collide::support_point(shape, placed_[s], k);
+      const Vec3<S> p = collide::support_point(shape, placed, k);
       const S gap = p.z + clearance;
       const Mask<S> active = near & (gap < reach);
       if (any(active)) add(s, k, p, gap, active);
@@ -221,13 +220,12 @@ template <class S>
 void ContactStage<S>::build_problem(dynamics::Tree<S>& tree, const S* friction, bool with_x) {
   compute_rows(tree);
   const int base_dofs = tables_->floating ? 6 : 0;
-  for (int k = 0; k < base_dofs; ++k) odd_[k] = k & 1;
   num_shared_ = 0;
   if (!apart()) {
     find_shared_joints();
     number_shared_dofs(tree);
   }
-  problem_.clear(base_dofs + num_shared_, odd_);
+  problem_.clear(base_dofs + num_shared_, num_shared_ > 0 ? odd_ : nullptr);
   if (with_x) {
     for (int k = 0; k < base_dofs; ++k) problem_.w0[k] = tree.base.x[k];
     for (int k = 0; k < num_shared_; ++k) {
@@ -247,74 +245,42 @@ STICKSLIP_INLINE Row3<S> row_where(Mask<S> m, const Row3<S>& row) {
   return make_row3(select(m, v[0], zero), select(m, v[1], zero), select(m, v[2], zero));
 }
 
-/// Sum of row row^T, a symmetric block. For a plain scalar by columns, one register each; for packs
-/// by its six numbers.
-template <class S>
-class BlockSum {
- public:
-  BlockSum() {
-    const S o = constant<S>(0);
-    if constexpr (kPlain)
-      for (auto& column : columns_) column = make_row3(o, o, o);
-    else
-      for (S& x : numbers_) x = o;
-  }
-  STICKSLIP_INLINE void add(const Row3<S>& row) {
-    S z[3];
-    store(row, z);
-    if constexpr (kPlain)
-      for (int r = 0; r < 3; ++r) columns_[r] = madd(row, z[r], columns_[r]);
-    else
-      for (int r = 0, k = 0; r < 3; ++r)
-        for (int c = r; c < 3; ++c, ++k) numbers_[k] = madd(z[c], z[r], numbers_[k]);
-  }
-  /// xx xy xz yy yz zz.
-  STICKSLIP_INLINE void store_to(S block[6]) const {
-    if constexpr (kPlain) {
-      S columns[3][3];
-      for (int r = 0; r < 3; ++r) store(columns_[r], columns[r]);
-      for (int r = 0, k = 0; r < 3; ++r)
-        for (int c = r; c < 3; ++c, ++k) block[k] = columns[r][c];
-    } else {
-      for (int k = 0; k < 6; ++k) block[k] = numbers_[k];
-    }
-  }
-
- private:
-  static constexpr bool kPlain = ScalarTraits<S>::kWidth == 1;
-  Row3<S> columns_[kPlain ? 3 : 1];
-  S numbers_[kPlain ? 1 : 6];
-};
-
 template <class S>
 void ContactStage<S>::fill_contact(const dynamics::Tree<S>& tree, const ActiveContact<S>& a,
                                    const S* friction, bool with_x) {
-  const int base_dofs = tables_->floating ? 6 : 0, c = problem_.append();
-  Row3<S>* y = problem_.y(c);  // of the base already
-  for (int k = 0; k < base_dofs; ++k) index_[k] = k;
-  int touched = base_dofs;
+  const int number = problem_.append();
+  contact::FactoredContact<S>& c = problem_.contact(number);  // its base columns are there already
   Row3<S> offset = make_row3(a.velocity.x, a.velocity.y, a.velocity.z + a.shift);
-  BlockSum<S> own;  // the private block
-  for (int k = a.rows.depth - 1; k >= 0; --k) {
-    const dynamics::LinkIndex link = a.rows.path[k];
-    const int dof = shared_dof(link);
-    Row3<S> row = a.rows.joint[k];
-    if (dof >= 0) {
+  contact::Symmetric3<S> own = contact::zero_symmetric<S>();  // the private block
+  const auto keep = [&](dynamics::LinkIndex link, const Row3<S>& row) STICKSLIP_LAMBDA {
+    own.add_square(row);
+    const S x = with_x ? dynamics::lane_of<S>(tree.links[link.slot].x, link.lane) : constant<S>(0);
+    offset = madd(row, x, offset);
+  };
+  int touched = tables_->floating ? 6 : 0;
+  if (num_shared_ > 0) {
+    for (int k = 0; k < touched; ++k) index_[k] = k;
+    for (int k = a.rows.depth - 1; k >= 0; --k) {
+      const dynamics::LinkIndex link = a.rows.path[k];
+      const Row3<S>& row = a.rows.joint[k];
+      const int dof = shared_dof(link);
+      if (dof < 0) {
+        keep(link, row);
+        continue;
+      }
       const Mask<S> shared = shared_[flat(link)];
-      y[touched] = row_where(shared, row);
+      c.y[touched] = row_where(shared, row);
       index_[touched++] = dof;
-      if (!any(a.active & !shared)) continue;
-      row = row_where(!shared, row);
+      if (any(a.active & !shared)) keep(link, row_where(!shared, row));
     }
-    own.add(row);
-    if (with_x)
-      offset = madd(row, dynamics::lane_of<S>(tree.links[link.slot].x, link.lane), offset);
+  } else {
+    for (int k = a.rows.depth - 1; k >= 0; --k) keep(a.rows.path[k], a.rows.joint[k]);
   }
-  own.store_to(problem_.private_block(c));
-  if (num_shared_ > 0 || !tables_->floating) problem_.set_index(c, index_, touched);
-  store(offset, problem_.offset(c));
-  problem_.friction(c) = friction[a.shape];
-  problem_.active(c) = a.active;
+  if (num_shared_ > 0 || !tables_->floating) problem_.set_index(number, index_, touched);
+  own.store_to(c.private_block);
+  store(offset, c.offset);
+  c.friction = friction[a.shape];
+  c.active = a.active;
 }
 
 /// The factored solver's options for the precision of S: never finer than it can reach.
@@ -504,14 +470,12 @@ void ContactStage<S>::solve_by_chain(const HostSolver& host, Mask<S> lanes, doub
 template <class S>
 Mask<S> ContactStage<S>::correct_overlap(dynamics::Tree<S>& tree, S clearance, double tolerance) {
   overlap_.clear();
+  collide::PlacedShape<S> placed;
   for (int i = 0; i < count_; ++i) {
     const int s = active_[i].shape;
     const collide::GroundShape& shape = tables_->shapes[s];
-    if (i == 0 || s != active_[i - 1].shape) {
-      placed_[s] = collide::place(tree, shape);
-      collide::orient(tree, shape, placed_[s]);
-    }
-    const Vec3<S> p = collide::support_point(shape, placed_[s], active_[i].point);
+    if (i == 0 || s != active_[i - 1].shape) placed = collide::place(tree, shape);
+    const Vec3<S> p = collide::support_point(shape, placed, active_[i].point);
     overlap_.add(shape.link, p, p.z + clearance, active_[i].active);
   }
   return overlap_.run(tree, constant<S>(tolerance));

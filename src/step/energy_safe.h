@@ -49,13 +49,13 @@ class EnergySafeStep {
       Invariants invariants = take_invariants();
       drift(h, invariants, live);
       correct_overlap(invariants, live);
-      fail(live, failed, live & !finite(robot_.q_new, tables_.nq));
+      fail(live, failed, live & !are_finite(robot_.q_new, tables_.nq));
       commit(live, robot_.q_new, tables_.nq, state().q);
       arrive(h, select(left > end, left, dt), invariants, live);
       ++robot_.info.substeps;
       live = live & (left > end);
     }
-    return failed | !finite(state().u, nu_);
+    return failed | !are_finite(state().u, nu_);
   }
 
  private:
@@ -78,9 +78,6 @@ class EnergySafeStep {
   };
 
   static S number(double x) { return constant<S>(x); }
-  static Mask<S> finite(const S* values, int n) {
-    return is_finite(sum_of_sizes(values, n, number(0)));
-  }
   static void fail(Mask<S>& live, Mask<S>& failed, Mask<S> now) {
     failed = failed | now;
     live = live & !now;
@@ -165,7 +162,7 @@ class EnergySafeStep {
       free_motion(h);
       contacts(h, live);
       const S turn = h * fastest_turn(robot_.u_plus);
-      kick_finite_ = is_finite(abs(turn)) & finite(robot_.u_plus, nu_);
+      kick_finite_ = is_finite(turn) & are_finite(robot_.u_plus, nu_);
       const Mask<S> retry =
           live & kick_finite_ & (turn > number(kMaxTurn)) & (h > shortest * number(1.0001));
       if (!any(retry)) return h;

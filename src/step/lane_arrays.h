@@ -45,26 +45,27 @@ STICKSLIP_INLINE Mask<S> none() {
   const S o = constant<S>(0);
   return o < o;
 }
-/// Lanes whose sum of sizes is neither NaN nor infinite.
+/// Lanes whose number is neither NaN nor infinite.
 template <class S>
-STICKSLIP_INLINE Mask<S> is_finite(S sum_of_sizes) {
-  return sum_of_sizes <= constant<S>(sizeof(Value<S>) == 4 ? 3.4028234e38 : 1.7976931348623157e308);
+STICKSLIP_INLINE Mask<S> is_finite(S x) {
+  return abs(x) <= constant<S>(sizeof(Value<S>) == 4 ? 3.4028234e38 : 1.7976931348623157e308);
+}
+/// Lanes whose n numbers all are: zero times any other is NaN. In four chains.
+template <class S>
+STICKSLIP_INLINE Mask<S> are_finite(const S* values, int n) {
+  const S zero = constant<S>(0);
+  S part[4] = {zero, zero, zero, zero};
+  int k = 0;
+  for (; k + 4 <= n; k += 4)
+    for (int j = 0; j < 4; ++j) part[j] = madd(values[k + j], zero, part[j]);
+  for (; k < n; ++k) part[0] = madd(values[k], zero, part[0]);
+  return (part[0] + part[1]) + (part[2] + part[3]) <= zero;
 }
 /// A residual as it is reported: infinite where the problem was refused, so that the largest of
 /// several says so.
 template <class S>
 STICKSLIP_INLINE S reported_residual(S residual) {
   return select(is_finite(residual), residual, constant<S>(__builtin_inf()));
-}
-/// Sums of sizes in four chains, to end in `is_finite`: only whether it is finite counts.
-template <class S>
-STICKSLIP_INLINE S sum_of_sizes(const S* values, int n, S sum) {
-  S part[4] = {sum, constant<S>(0), constant<S>(0), constant<S>(0)};
-  int k = 0;
-  for (; k + 4 <= n; k += 4)
-    for (int j = 0; j < 4; ++j) part[j] = part[j] + abs(values[k + j]);
-  for (; k < n; ++k) part[0] = part[0] + abs(values[k]);
-  return (part[0] + part[1]) + (part[2] + part[3]);
 }
 
 }  // namespace stickslip::step::inline STICKSLIP_KERNELS

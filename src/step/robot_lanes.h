@@ -85,7 +85,6 @@ struct RobotLanes {
     backup.q = arena.take<S>(t.nq);
     backup.u = arena.take<S>(t.nu);
     backup.impulse = arena.take<S>(3 * t.num_points);
-    backup.earlier_impulse = arena.take<S>(3 * t.num_points);
     backup.drift_acceleration = arena.take<S>(t.nu);
   }
 
@@ -109,13 +108,13 @@ struct RobotLanes {
   }
 };
 
-/// `to` becomes a copy of `from`, whatever it held.
+/// `to` becomes a copy of `from`, whatever it held; not of the earlier impulses, which the
+/// integrator that copies leaves alone.
 template <class S>
 STICKSLIP_INLINE void copy_state(const RobotTables& t, const LaneState<S>& from, LaneState<S>& to) {
   copy(from.q, t.nq, to.q);
   copy(from.u, t.nu, to.u);
   copy(from.impulse, 3 * t.num_points, to.impulse);
-  copy(from.earlier_impulse, 3 * t.num_points, to.earlier_impulse);
   copy(from.drift_acceleration, t.nu, to.drift_acceleration);
   to.pending_gravity = from.pending_gravity;
   to.fresh = from.fresh;
@@ -127,7 +126,6 @@ STICKSLIP_INLINE void copy_state_where(const RobotTables& t, Mask<S> m, const La
   copy_where(m, from.q, t.nq, to.q);
   copy_where(m, from.u, t.nu, to.u);
   copy_where(m, from.impulse, 3 * t.num_points, to.impulse);
-  copy_where(m, from.earlier_impulse, 3 * t.num_points, to.earlier_impulse);
   copy_where(m, from.drift_acceleration, t.nu, to.drift_acceleration);
   to.pending_gravity = select(m, from.pending_gravity, to.pending_gravity);
   to.fresh = (m & from.fresh) | ((!m) & to.fresh);

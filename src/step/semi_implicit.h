@@ -82,7 +82,7 @@ void step_semi_implicit(RobotLanes<S>& robot, const StepSettings& settings) {
   for (int k = 0; k < offset; ++k) next[k] = s.u[k] + base[k] + zero;
   for (int j = offset; j < nu; ++j) next[j] = s.u[j] + next[j] + zero;
   integrate_configuration(tables, s.q, next, dt, q_new);
-  const Mask<S> finite = is_finite(sum_of_sizes(q_new, nq, sum_of_sizes(next, nu, zero)));
+  const Mask<S> finite = are_finite(q_new, nq) & are_finite(next, nu);
   if (all(finite)) {
     swap(s.q, robot.q_new);
     swap(s.u, robot.u_plus);

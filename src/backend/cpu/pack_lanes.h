@@ -163,8 +163,7 @@ void PackLanes<S>::check_state() {
   for (int k = 0; k < t.nu; ++k) same = same & (s.u[k] >= last_u_[k]) & (s.u[k] <= last_u_[k]);
   set_aside_ = step::none<S>();
   if (all(same)) return;
-  const S sum = step::sum_of_sizes(s.q, t.nq, step::sum_of_sizes(s.u, t.nu, zero));
-  Mask<S> good = step::is_finite(sum);
+  Mask<S> good = step::are_finite(s.q, t.nq) & step::are_finite(s.u, t.nu);
   const S* joints = robot_.joints(s.q);
   for (int j = 0; j < t.num_joints; ++j) good = good & (abs(joints[j]) <= largest);
   if (t.floating) {
@@ -200,8 +199,7 @@ void PackLanes<S>::load_control(const EnvArrays& arrays, long first) {
   load_rows(rows(arrays.pd_target, t.num_joints, first), t.num_joints, target_);
   repeat(target_, t.num_joints);
   // Else a target that is none would count or not, by whether a neighbor is driven.
-  for (int j = 0; j < t.num_joints; ++j)
-    set_aside_ = set_aside_ | !step::is_finite(abs(target_[j]));
+  for (int j = 0; j < t.num_joints; ++j) set_aside_ = set_aside_ | !step::is_finite(target_[j]);
   c.gravity = {gravity_[0], gravity_[1], gravity_[2]};
   const auto some = [&](S x) { return !((x >= zero) & (x <= zero)); };  // also NaN
   Mask<S> gains = step::none<S>(), forces = gains, on_base = gains, pushed = gains;
@@ -221,7 +219,7 @@ void PackLanes<S>::load_control(const EnvArrays& arrays, long first) {
     // What pulls at a fixed base moves nothing.
     for (int k = t.floating ? 0 : 6; k < 6 * t.num_bodies; ++k) pushed = pushed | some(scratch_[k]);
     for (int k = 0; k < 6 * t.num_bodies; ++k)
-      set_aside_ = set_aside_ | !step::is_finite(abs(scratch_[k]));
+      set_aside_ = set_aside_ | !step::is_finite(scratch_[k]);
   }
   forces = forces | pushed;
   c.pd = any(gains);
