@@ -7,7 +7,7 @@
 // at the new configuration by a displacement that touches no velocity, and the work of lifting is
 // paid by the motion. Where links turn far in one step, the step is cut (substeps).
 //
-// Kept between steps: q, u and a1 = -M^-1 C(q, u), all at the same time (robot_data.h).
+// Kept between steps: q, u and a1 = -M^-1 C(q, u), all at the same time (LaneState).
 //
 // Lanes go through the substeps together. One that is through, or failed, keeps its state while the
 // others go on; one whose kick was short enough goes through the same kick again, with the same

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "backend/cpu/batch_impl.h"
-#include "step/state_check.h"
+#include "world/state_check.h"
 
 namespace stickslip {
 namespace {
@@ -107,13 +107,13 @@ void Batch::reset(std::span<const std::int64_t> envs, std::span<const double> q,
     return u.empty() ? impl_->start_u.data() : u.data() + k * nu;
   };
   for (std::size_t k = 0; k < n; ++k)
-    if (const std::string fault = step::state_fault(model(), q_of(k), u_of(k)); !fault.empty())
+    if (const std::string fault = world::state_fault(model(), q_of(k), u_of(k)); !fault.empty())
       reject(".reset: row " + std::to_string(k) + ", " + fault);
   for (std::size_t k = 0; k < n; ++k) impl_->reset(envs[k], q_of(k), u_of(k));
 }
 
 void Batch::set_profiling(bool on) {
-  for (auto& worker : impl_->workers) worker->settings.clock = on ? step::clock_seconds : nullptr;
+  for (auto& worker : impl_->workers) worker->settings.clock = on ? world::clock_seconds : nullptr;
 }
 
 const StageTimes& Batch::stage_times() const {

@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "step/state_check.h"
+#include "world/state_check.h"
 
 namespace stickslip {
 namespace {
@@ -49,7 +49,7 @@ int thread_count(const BatchOptions& o, long packs) {
 Batch::Impl::Worker::Worker(const PackKernels& kernels, const backend::PackScene& scene,
                             const StepSolverOptions& solver)
     : host(scene.tables->num_points, solver) {
-  workspace = step::AlignedBlock(static_cast<std::size_t>(kernels.workspace_bytes(scene)));
+  workspace = world::AlignedBlock(static_cast<std::size_t>(kernels.workspace_bytes(scene)));
   kernels.prepare(workspace.data(), scene);
 }
 
@@ -74,7 +74,7 @@ Batch::Impl::Impl(const World::Impl& world, const BatchOptions& o)
   fill_parameters(world.data(0), world.gravity);
   const int number = o.precision == Precision::kFloat32 ? 4 : 8;
   history_block =
-      step::AlignedBlock(static_cast<std::size_t>(padded) * history_rows.numbers * number);
+      world::AlignedBlock(static_cast<std::size_t>(padded) * history_rows.numbers * number);
   fill_start(world.data(0));
   for (int k = 0; k < pool.size(); ++k) {
     workers.push_back(std::make_unique<Worker>(*kernels, pack_scene, world_options.solver));
@@ -93,7 +93,7 @@ Batch::Impl::Hold::Hold(Impl& batch, const char* what) : batch_(batch) {
 }
 
 void Batch::Impl::fill_pack_scene() {
-  constants = step::AlignedBlock(constants_bytes(layout, *kernels));
+  constants = world::AlignedBlock(constants_bytes(layout, *kernels));
   if (kernels->single)
     dynamics::write_constants(layout, kernels->bundle_lanes,
                               reinterpret_cast<float*>(constants.data()));
@@ -113,7 +113,7 @@ void Batch::Impl::fill_pack_scene() {
   std::copy(layout.base.inertia.begin(), layout.base.inertia.end(), p.base_inertia);
 }
 
-void Batch::Impl::fill_parameters(const step::RobotData& robot, const Vec3<double>& gravity) {
+void Batch::Impl::fill_parameters(const world::RobotData& robot, const Vec3<double>& gravity) {
   using enum BatchField;
   for (const collide::GroundShape& s : scene.shapes()) {
     scene.set_law(static_cast<int>(shapes.size()),
@@ -121,7 +121,7 @@ void Batch::Impl::fill_parameters(const step::RobotData& robot, const Vec3<doubl
     shapes.push_back(s.shape);
     for (int k = 0; k < s.num_points; ++k) points.push_back({s.body, s.shape, k});
   }
-  const step::RobotControl& c = robot.control;
+  const world::RobotControl& c = robot.control;
   memory.set_shared_row(kGeneralizedForce, c.generalized_force);
   memory.set_shared_row(kPdTarget, c.target);
   memory.set_shared_row(kKp, c.kp);
@@ -144,7 +144,7 @@ void Batch::Impl::fill_parameters(const step::RobotData& robot, const Vec3<doubl
     memory.data(f);
 }
 
-void Batch::Impl::fill_start(const step::RobotData& robot) {
+void Batch::Impl::fill_start(const world::RobotData& robot) {
   start_q = robot.state.q;
   start_u = robot.state.u;
   for (long env = 0; env < padded; ++env) reset(env, start_q.data(), start_u.data());
@@ -162,7 +162,7 @@ void Batch::Impl::set_history(long env, int row, double value) {
 void Batch::Impl::reset(long env, const double* q, const double* u) {
   using enum BatchField;
   const step::RobotTables& t = scene.tables();
-  const double length = step::quaternion_length(*model, q);
+  const double length = world::quaternion_length(*model, q);
   for (int k = 0; k < history_rows.numbers; ++k) set_history(env, k, 0);
   for (int k = 0; k < t.nq; ++k) {
     const double x = t.floating && k >= 3 && k < 7 ? q[k] / length : q[k];

@@ -8,9 +8,9 @@
 #include "backend/cpu/body_parameters.h"
 #include "backend/cpu/instruction_sets.h"
 #include "backend/cpu/thread_pool.h"
-#include "step/host_solver.h"
-#include "step/robot_scene.h"
-#include "step/world_impl.h"
+#include "world/host_solver.h"
+#include "world/robot_scene.h"
+#include "world/world_impl.h"
 
 namespace stickslip {
 
@@ -21,8 +21,8 @@ struct Batch::Impl {
   struct Worker {
     Worker(const backend::PackKernels& kernels, const backend::PackScene& scene,
            const StepSolverOptions& solver);
-    step::AlignedBlock workspace;
-    step::SolverOnHost host;
+    world::AlignedBlock workspace;
+    world::SolverOnHost host;
     step::StepSettings settings;
     double stages[step::kNumStages] = {};
   };
@@ -57,14 +57,14 @@ struct Batch::Impl {
   const backend::PackKernels* kernels;
   std::string instruction_set;
   dynamics::TreeLayout layout;
-  step::RobotScene scene;
-  step::AlignedBlock constants;
+  world::RobotScene scene;
+  world::AlignedBlock constants;
   backend::PackScene pack_scene;
   backend::PackHistory history_rows;
   step::StepSettings settings;
   long padded;
   backend::BatchMemory memory;
-  step::AlignedBlock history_block;
+  world::AlignedBlock history_block;
   backend::BodyParameters bodies;
   bool force = false;  // generalized forces are in use
   std::vector<double> start_q, start_u;
@@ -77,8 +77,8 @@ struct Batch::Impl {
 
  private:
   void fill_pack_scene();
-  void fill_parameters(const step::RobotData& robot, const Vec3<double>& gravity);
-  void fill_start(const step::RobotData& robot);
+  void fill_parameters(const world::RobotData& robot, const Vec3<double>& gravity);
+  void fill_start(const world::RobotData& robot);
   std::vector<std::uint64_t> signature() const;
 
   std::atomic_flag held_;

@@ -77,7 +77,7 @@ BatchMemory::BatchMemory(const step::RobotTables& t, Precision precision, long n
   define(kExternalWrench, number, {t.num_bodies, 6});
   for (const BatchField f : {kGeneralizedForce, kPdTarget, kKp, kKd, kFriction, kGravity, kBodyMass,
                              kBodyCom, kBodyInertia, kExternalWrench})
-    field(f).shared = step::AlignedBlock(row(f) * size_of(type(f)));
+    field(f).shared = world::AlignedBlock(row(f) * size_of(type(f)));
 }
 
 long BatchMemory::row(BatchField f) const {
@@ -90,7 +90,7 @@ char* BatchMemory::data(BatchField f) {
   Field& x = field(f);
   if (x.block) return x.block.data();
   const std::size_t bytes = row(f) * size_of(x.type);
-  x.block = step::AlignedBlock(padded_ * bytes);
+  x.block = world::AlignedBlock(padded_ * bytes);
   if (x.shared)
     for (long env = 0; env < padded_; ++env)
       std::memcpy(x.block.data() + env * bytes, x.shared.data(), bytes);

@@ -5,8 +5,8 @@
 
 #include <array>
 
-#include "step/aligned_block.h"
 #include "step/step_tables.h"
+#include "world/aligned_block.h"
 
 namespace stickslip::backend {
 
@@ -36,7 +36,7 @@ class BatchMemory {
   struct Field {
     NumberType type;
     std::vector<int> shape;  // of one environment
-    step::AlignedBlock block, shared;
+    world::AlignedBlock block, shared;
   };
   static constexpr int kFields = static_cast<int>(BatchField::kExternalWrench) + 1;
   Field& field(BatchField f) { return fields_[static_cast<int>(f)]; }

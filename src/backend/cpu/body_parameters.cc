@@ -13,7 +13,7 @@ void BodyParameters::allocate(BatchMemory& memory) {
   }
   const std::size_t per_link = static_cast<std::size_t>(kNumbers) * lanes() * number_bytes();
   const long packs = padded_ / kernels_.width;
-  using step::AlignedBlock;  // all or none
+  using world::AlignedBlock;  // all or none
   AlignedBlock links(packs * layout_.num_slots * per_link),
       base(static_cast<std::size_t>(padded_) * kNumbers * number_bytes()), seen(padded_ * row);
   links_ = std::move(links), base_ = std::move(base), seen_ = std::move(seen);

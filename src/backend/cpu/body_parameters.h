@@ -40,8 +40,8 @@ class BodyParameters {
   const dynamics::TreeLayout& layout_;
   const PackKernels& kernels_;
   long padded_;
-  step::AlignedBlock links_, base_;
-  step::AlignedBlock seen_;  // the users' rows as they were turned last
+  world::AlignedBlock links_, base_;
+  world::AlignedBlock seen_;  // the users' rows as they were turned last
 };
 
 }  // namespace stickslip::backend

@@ -8,7 +8,7 @@
 
 #include "step/step_tables.h"
 
-namespace stickslip::step {
+namespace stickslip::world {
 
 class RobotScene {
  public:
@@ -17,7 +17,7 @@ class RobotScene {
   RobotScene(const RobotScene&) = delete;
   RobotScene& operator=(const RobotScene&) = delete;
 
-  const RobotTables& tables() const { return tables_; }
+  const step::RobotTables& tables() const { return tables_; }
   const std::vector<collide::GroundShape>& shapes() const { return shapes_; }
   /// Contact law of one of `shapes()`.
   void set_law(int shape, const MaterialPair& law);
@@ -31,7 +31,7 @@ class RobotScene {
   std::unique_ptr<bool[]> apart_;
   std::vector<double> foresight_;
   std::unique_ptr<bool[]> prismatic_;
-  RobotTables tables_;
+  step::RobotTables tables_;
 };
 
-}  // namespace stickslip::step
+}  // namespace stickslip::world

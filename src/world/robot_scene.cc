@@ -1,8 +1,8 @@
-#include "step/robot_scene.h"
+#include "world/robot_scene.h"
 
 #include <algorithm>
 
-namespace stickslip::step {
+namespace stickslip::world {
 namespace {
 
 int longest_path(const dynamics::TreeLayout& layout) {
@@ -70,7 +70,7 @@ RobotScene::RobotScene(const Model& model, const dynamics::TreeLayout& layout,
     tables_.damped = tables_.damped || joint.damping > 0;
     prismatic_[j] = joint.type == JointType::kPrismatic;
   }
-  RobotTables& t = tables_;
+  step::RobotTables& t = tables_;
   t.floating = layout.floating;
   t.nq = model.nq(), t.nu = model.nu();
   t.num_joints = model.num_joints(), t.num_bodies = static_cast<int>(model.bodies().size());
@@ -97,4 +97,4 @@ void RobotScene::set_law(int shape, const MaterialPair& law) {
   threshold_[shape] = law.restitution_threshold;
 }
 
-}  // namespace stickslip::step
+}  // namespace stickslip::world

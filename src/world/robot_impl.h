@@ -1,7 +1,7 @@
 // What is behind a Robot: its data, and a second workspace for questions, so that asking does not
 // disturb the step.
 #pragma once
-#include "step/robot_data.h"
+#include "world/robot_data.h"
 
 namespace stickslip {
 
@@ -18,7 +18,7 @@ struct Robot::Impl {
   Spatial<double> momentum();
   void collect_contacts();
 
-  step::RobotData data;
+  world::RobotData data;
   dynamics::TreeMemory<double> query;
   std::vector<RigidInertia<dynamics::Wide<double>>> scratch;
   std::vector<double> velocity;  // scratch (nu)

@@ -1,4 +1,4 @@
-#include "step/host_solver.h"
+#include "world/host_solver.h"
 
 #include <algorithm>
 #include <chrono>
@@ -9,7 +9,7 @@
 #include "contact/pgs.h"
 #include "solvers/chain.h"
 
-namespace stickslip::step {
+namespace stickslip::world {
 namespace {
 
 /// Of the explicit view of a problem and, for the chain, its best impulse and its stages.
@@ -19,14 +19,14 @@ size_t bytes(int contacts, bool chain) {
   return sizeof(double) * (numbers + best) + (chain ? solvers::brief_chain_bytes(contacts) : 0);
 }
 
-contact::ExplicitProblem view_of(const DenseProblem& d, double* workspace) {
+contact::ExplicitProblem view_of(const step::DenseProblem& d, double* workspace) {
   contact::ExplicitProblem p{d.contacts, d.delassus, d.free_velocity, d.friction, d.impulse};
   p.attach(workspace);
   contact::prepare(p);
   return p;
 }
 
-void take_velocity(const contact::ExplicitProblem& p, DenseProblem& d) {
+void take_velocity(const contact::ExplicitProblem& p, step::DenseProblem& d) {
   std::copy(p.v, p.v + 3 * d.contacts, d.velocity);
 }
 
@@ -39,12 +39,12 @@ SolverOnHost::SolverOnHost(int max_points, const StepSolverOptions& options)
                         : max_points),
       memory_(bytes(max_contacts_, options.method == SolveMethod::kAuto)) {}
 
-HostSolver SolverOnHost::view() {
+step::HostSolver SolverOnHost::view() {
   const bool automatic = options_.method == SolveMethod::kAuto;
   return {this, automatic ? run_chain : run_method, !automatic, max_contacts_};
 }
 
-HostSolver::Effort SolverOnHost::run_method(void* self, DenseProblem& d, double) {
+step::HostSolver::Effort SolverOnHost::run_method(void* self, step::DenseProblem& d, double) {
   const auto& solver = *static_cast<SolverOnHost*>(self);
   const StepSolverOptions& options = solver.options_;
   contact::ExplicitProblem p = view_of(d, reinterpret_cast<double*>(solver.memory_.data()));
@@ -60,14 +60,15 @@ HostSolver::Effort SolverOnHost::run_method(void* self, DenseProblem& d, double)
       options.method == SolveMethod::kPgs ? contact::pgs(p, o) : contact::per_contact(p, o);
   contact::refresh_velocity(p);
   take_velocity(p, d);
-  HostSolver::Effort effort;
+  step::HostSolver::Effort effort;
   effort.sweeps = found.sweeps;
   effort.solved = found.converged;
   effort.residual = contact::largest_residual(p, o.max_dissipation);
   return effort;
 }
 
-HostSolver::Effort SolverOnHost::run_chain(void* self, DenseProblem& d, double tolerance) {
+step::HostSolver::Effort SolverOnHost::run_chain(void* self, step::DenseProblem& d,
+                                                 double tolerance) {
   const auto& solver = *static_cast<SolverOnHost*>(self);
   std::pmr::monotonic_buffer_resource memory(solver.memory_.data(), bytes(d.contacts, true));
   solvers::Doubles workspace(contact::ExplicitProblem::workspace_size(d.contacts), &memory);
@@ -77,7 +78,7 @@ HostSolver::Effort SolverOnHost::run_chain(void* self, DenseProblem& d, double t
   if (!best.offer(p, SolveStage::kStart)) solvers::run_brief_chain(p, best, spent, &memory);
   best.restore(p);
   take_velocity(p, d);
-  HostSolver::Effort effort;
+  step::HostSolver::Effort effort;
   effort.newton_steps = spent.newton_steps + spent.interior_point_steps;
   // Contacts that cannot push count here: a step may not hide that one is driven in.
   effort.residual = contact::largest_residual(p, false);
@@ -89,8 +90,8 @@ double clock_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-StepSettings step_settings(const WorldOptions& o) {
-  StepSettings s{};
+step::StepSettings step_settings(const WorldOptions& o) {
+  step::StepSettings s{};
   s.time_step = o.time_step;
   s.max_substeps = o.max_substeps;
   s.energy_safe = o.integrator == Integrator::kEnergySafe;
@@ -101,4 +102,4 @@ StepSettings step_settings(const WorldOptions& o) {
   return s;
 }
 
-}  // namespace stickslip::step
+}  // namespace stickslip::world

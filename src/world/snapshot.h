@@ -4,9 +4,9 @@
 #include <span>
 #include <vector>
 
-#include "step/robot_data.h"
+#include "world/robot_data.h"
 
-namespace stickslip::step {
+namespace stickslip::world {
 
 struct Snapshot {
   double time = 0;
@@ -19,4 +19,4 @@ std::vector<std::uint8_t> write_snapshot(double time, const std::vector<const Ro
 Snapshot read_snapshot(std::span<const std::uint8_t> blob,
                        const std::vector<const RobotData*>& robots);
 
-}  // namespace stickslip::step
+}  // namespace stickslip::world

@@ -7,7 +7,7 @@
 #include <new>
 #include <string>
 
-namespace stickslip::step {
+namespace stickslip::world {
 
 class AlignedBlock {
  public:
@@ -35,4 +35,4 @@ class AlignedBlock {
   std::size_t bytes_ = 0;
 };
 
-}  // namespace stickslip::step
+}  // namespace stickslip::world

@@ -3,11 +3,11 @@
 #include <stickslip/world.h>
 
 #include "dynamics/tree_memory.h"
-#include "step/host_solver.h"
 #include "step/robot_lanes.h"
-#include "step/robot_scene.h"
+#include "world/host_solver.h"
+#include "world/robot_scene.h"
 
-namespace stickslip::step {
+namespace stickslip::world {
 
 /// What changes from step to step. Copying it is a snapshot; restoring it replays bit for bit.
 struct RobotState {
@@ -44,10 +44,10 @@ struct RobotData {
   dynamics::TreeMemory<double> memory;
   RobotScene scene;
   SolverOnHost host;
-  RobotLanes<double> lanes;  // one lane: this robot
+  step::RobotLanes<double> lanes;  // one lane: this robot
   StepInfo info;
 
-  const ContactStage<double>& contacts() const { return lanes.contacts; }
+  const step::ContactStage<double>& contacts() const { return lanes.contacts; }
   /// The last step's contacts and workspace no longer belong to the state.
   void forget_step();
   bool floating() const { return scene.tables().floating; }
@@ -62,10 +62,10 @@ struct RobotData {
   Vec3<double> angular(const double* u) const { return lanes.angular(u); }
 
   /// One time step. The state only changes if the result is finite.
-  void step(StepSettings settings, const Vec3<double>& gravity);
+  void step(step::StepSettings settings, const Vec3<double>& gravity);
 
  private:
   AlignedBlock block_;  // of the lanes
 };
 
-}  // namespace stickslip::step
+}  // namespace stickslip::world

@@ -8,8 +8,8 @@
 #include "dynamics/bias.h"
 #include "dynamics/mass_matrix.h"
 #include "model/pose.h"
-#include "step/robot_impl.h"
-#include "step/state_check.h"
+#include "world/robot_impl.h"
+#include "world/state_check.h"
 
 namespace stickslip {
 namespace {
@@ -85,13 +85,13 @@ std::span<const double> Robot::pd_kd() const { return impl_->data.control.kd; }
 std::span<const double> Robot::pd_target() const { return impl_->data.control.target; }
 
 void Robot::set_state(std::span<const double> q, std::span<const double> u) {
-  step::RobotData& d = impl_->data;
+  world::RobotData& d = impl_->data;
   check_size(d.name, ".q", q, d.state.q.size());
   check_size(d.name, ".u", u, d.state.u.size());
-  if (const std::string fault = step::state_fault(*d.model, q.data(), u.data()); !fault.empty())
+  if (const std::string fault = world::state_fault(*d.model, q.data(), u.data()); !fault.empty())
     throw ModelError(d.name + "." + fault);
-  const double length = step::quaternion_length(*d.model, q.data());
-  step::RobotState& s = d.state;
+  const double length = world::quaternion_length(*d.model, q.data());
+  world::RobotState& s = d.state;
   std::copy(q.begin(), q.end(), s.q.begin());
   std::copy(u.begin(), u.end(), s.u.begin());
   if (d.floating())
@@ -105,14 +105,14 @@ void Robot::set_state(std::span<const double> q, std::span<const double> u) {
 }
 
 void Robot::set_generalized_force(std::span<const double> tau) {
-  step::RobotControl& c = impl_->data.control;
+  world::RobotControl& c = impl_->data.control;
   check(name(), ".generalized_force", tau, c.generalized_force.size());
   std::copy(tau.begin(), tau.end(), c.generalized_force.begin());
   c.force = any_nonzero(tau);
 }
 
 void Robot::set_pd_gains(std::span<const double> kp, std::span<const double> kd) {
-  step::RobotControl& c = impl_->data.control;
+  world::RobotControl& c = impl_->data.control;
   check_gains(name(), ".kp", kp, c.kp.size());
   check_gains(name(), ".kd", kd, c.kd.size());
   if (std::equal(kp.begin(), kp.end(), c.kp.begin()) &&
@@ -127,7 +127,7 @@ void Robot::set_pd_gains(std::span<const double> kp, std::span<const double> kd)
 }
 
 void Robot::set_pd_target(std::span<const double> target) {
-  step::RobotControl& c = impl_->data.control;
+  world::RobotControl& c = impl_->data.control;
   check(name(), ".pd_target", target, c.target.size());
   std::copy(target.begin(), target.end(), c.target.begin());
 }
@@ -139,7 +139,7 @@ void Robot::mass_matrix(std::span<double> out) const {
 }
 
 void Robot::bias_force(std::span<double> out) const {
-  step::RobotData& d = impl_->data;
+  world::RobotData& d = impl_->data;
   check_output("bias_force", out, d.state.u.size());
   dynamics::Tree<double>& t = impl_->tree_at_state();
   const double* u = d.state.u.data();
@@ -152,7 +152,7 @@ void Robot::bias_force(std::span<double> out) const {
 }
 
 void Robot::forward_dynamics(std::span<const double> tau, std::span<double> out) const {
-  step::RobotData& d = impl_->data;
+  world::RobotData& d = impl_->data;
   check("", "tau", tau, d.state.u.size());
   check_output("forward_dynamics", out, d.state.u.size());
   dynamics::Tree<double>& t = impl_->tree_at_state();
@@ -170,7 +170,7 @@ void Robot::forward_dynamics(std::span<const double> tau, std::span<double> out)
 }
 
 void Robot::jacobian(const std::string& frame_name, std::span<double> out) const {
-  step::RobotData& d = impl_->data;
+  world::RobotData& d = impl_->data;
   const int nu = model().nu(), offset = d.offset();
   check_output("jacobian", out, 6 * nu);
   const Frame& frame = model().frame(frame_name);
@@ -198,7 +198,7 @@ void Robot::jacobian(const std::string& frame_name, std::span<double> out) const
 }
 
 Pose Robot::frame_pose(const std::string& frame_name) const {
-  step::RobotData& d = impl_->data;
+  world::RobotData& d = impl_->data;
   const Frame& frame = model().frame(frame_name);
   const dynamics::Tree<double>& t = impl_->tree_at_state();
   const auto& layout = d.memory.layout();
@@ -223,7 +223,7 @@ double Robot::kinetic_energy() const {
 }
 
 double Robot::mechanical_energy() const {
-  const step::RobotState& s = impl_->data.state;
+  const world::RobotState& s = impl_->data.state;
   double* velocity = impl_->velocity.data();
   if (s.pending_gravity > 0)
     impl_->gravity_acceleration(velocity);
@@ -288,7 +288,7 @@ Spatial<double> Robot::Impl::momentum() {
 
 void Robot::delassus(std::span<const int> bodies, std::span<const Vector3> points,
                      std::span<double> out) const {
-  step::RobotData& d = impl_->data;
+  world::RobotData& d = impl_->data;
   const size_t n = bodies.size(), nu = d.memory.layout().num_joints + 6;
   if (points.size() != n)
     throw ModelError("delassus: " + std::to_string(n) + " bodies but " +

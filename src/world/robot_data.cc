@@ -1,14 +1,14 @@
-#include "step/robot_data.h"
+#include "world/robot_data.h"
 
 #include <algorithm>
 
 #include "step/integrators.h"
 
-namespace stickslip::step {
+namespace stickslip::world {
 namespace {
 
 /// Lays the lanes out in a block of their own.
-AlignedBlock give_memory(RobotLanes<double>& lanes, const RobotTables& tables) {
+AlignedBlock give_memory(step::RobotLanes<double>& lanes, const step::RobotTables& tables) {
   contact::Arena count(nullptr);
   lanes.lay_out(count, tables);
   AlignedBlock block(static_cast<size_t>(count.used()));
@@ -61,8 +61,8 @@ void RobotData::forget_step() {
   lanes.contacts.forget();
 }
 
-void RobotData::step(StepSettings settings, const Vec3<double>& gravity) {
-  LaneState<double>& s = lanes.state;
+void RobotData::step(step::StepSettings settings, const Vec3<double>& gravity) {
+  step::LaneState<double>& s = lanes.state;
   s = {state.q.data(),
        state.u.data(),
        state.impulse.data(),
@@ -88,15 +88,15 @@ void RobotData::step(StepSettings settings, const Vec3<double>& gravity) {
                    on_base};
   settings.host = host.view();
   if (settings.energy_safe)
-    step_energy_safe(lanes, settings);
+    step::step_energy_safe(lanes, settings);
   else
-    step_semi_implicit(lanes, settings);
+    step::step_semi_implicit(lanes, settings);
   take_back(s.q, lanes.q_new, state.q);
   take_back(s.u, lanes.u_plus, state.u);
   if (s.impulse != state.impulse.data()) state.impulse.swap(state.earlier_impulse);
   state.pending_gravity = s.pending_gravity;
   state.fresh = s.fresh;
-  const LaneInfo<double>& i = lanes.info;
+  const step::LaneInfo<double>& i = lanes.info;
   info = {StepStatus::kOk, i.contacts, i.sweeps, i.newton_steps, i.substeps, i.residual};
   if (i.unconverged) info.status = StepStatus::kNotConverged;
   if (i.non_finite)
@@ -105,4 +105,4 @@ void RobotData::step(StepSettings settings, const Vec3<double>& gravity) {
     state.time += settings.time_step;
 }
 
-}  // namespace stickslip::step
+}  // namespace stickslip::world

@@ -6,8 +6,8 @@
 #include <set>
 
 #include "solvers/validate.h"
-#include "step/snapshot.h"
-#include "step/world_impl.h"
+#include "world/snapshot.h"
+#include "world/world_impl.h"
 
 namespace stickslip {
 namespace {
@@ -53,7 +53,7 @@ void WorldOptions::validate() const {
 
 World::Impl::Impl(const WorldOptions& o)
     : options(o),
-      settings(step::step_settings(o)),
+      settings(world::step_settings(o)),
       gravity{o.gravity[0], o.gravity[1], o.gravity[2]} {
   settings.stages = stages;
 }
@@ -65,7 +65,7 @@ MaterialPair World::Impl::pair(const std::string& a, const std::string& b) const
 
 void World::Impl::refresh_laws() {
   for (int r = 0; r < static_cast<int>(robots.size()); ++r) {
-    step::RobotData& d = data(r);
+    world::RobotData& d = data(r);
     for (int k = 0; k < d.scene.tables().num_shapes; ++k) {
       const std::string& own = d.model->shapes()[d.scene.shapes()[k].shape].material;
       d.scene.set_law(k, pair(own.empty() ? d.material : own, ground_material));
@@ -146,7 +146,7 @@ StepStatus World::step(int steps) {
   std::uint32_t status = 0;
   for (int k = 0; k < steps; ++k) {
     for (auto& robot : impl_->robots) {
-      step::RobotData& d = robot->impl_->data;
+      world::RobotData& d = robot->impl_->data;
       d.step(impl_->settings, impl_->gravity);
       status |= static_cast<std::uint32_t>(d.info.status);
     }
@@ -157,18 +157,18 @@ StepStatus World::step(int steps) {
 }
 
 std::vector<std::uint8_t> World::save_state() const {
-  std::vector<const step::RobotData*> robots;
+  std::vector<const world::RobotData*> robots;
   for (const auto& r : impl_->robots) robots.push_back(&r->impl_->data);
-  return step::write_snapshot(impl_->time, robots);
+  return world::write_snapshot(impl_->time, robots);
 }
 
 void World::load_state(std::span<const std::uint8_t> blob) {
-  std::vector<const step::RobotData*> robots;
+  std::vector<const world::RobotData*> robots;
   for (const auto& r : impl_->robots) robots.push_back(&r->impl_->data);
-  step::Snapshot snapshot = step::read_snapshot(blob, robots);  // throws before anything changes
+  world::Snapshot snapshot = world::read_snapshot(blob, robots);  // throws before anything changes
   impl_->time = snapshot.time;
   for (size_t k = 0; k < snapshot.robots.size(); ++k) {
-    step::RobotData& d = impl_->robots[k]->impl_->data;
+    world::RobotData& d = impl_->robots[k]->impl_->data;
     d.state = snapshot.robots[k];
     d.forget_step();
   }
@@ -176,8 +176,8 @@ void World::load_state(std::span<const std::uint8_t> blob) {
 
 ContactProblem World::next_contact_problem(int index) {
   Robot& r = robot(index);
-  step::RobotData& d = r.impl_->data;
-  const step::RobotState before = d.state;
+  world::RobotData& d = r.impl_->data;
+  const world::RobotState before = d.state;
   const StepInfo info = d.info;
   d.step(impl_->settings, impl_->gravity);
   ContactProblem p = explicit_problem(d.contacts());
@@ -197,7 +197,7 @@ ContactProblem World::last_contact_problem(int index, std::vector<double>* impul
   return explicit_problem(contacts);
 }
 
-void World::set_profiling(bool on) { impl_->settings.clock = on ? step::clock_seconds : nullptr; }
+void World::set_profiling(bool on) { impl_->settings.clock = on ? world::clock_seconds : nullptr; }
 const StageTimes& World::stage_times() const {
   const double* t = impl_->stages;
   impl_->times = {t[step::kDynamics], t[step::kDetection], t[step::kDelassus],

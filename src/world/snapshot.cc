@@ -1,11 +1,11 @@
-#include "step/snapshot.h"
+#include "world/snapshot.h"
 
 #include <stickslip/errors.h>
 
 #include <cmath>
 #include <cstring>
 
-namespace stickslip::step {
+namespace stickslip::world {
 namespace {
 
 constexpr std::uint64_t kMagic = 0x33304c5053535453;  // "STSSPL03"
@@ -133,4 +133,4 @@ Snapshot read_snapshot(std::span<const std::uint8_t> blob,
   return out;
 }
 
-}  // namespace stickslip::step
+}  // namespace stickslip::world

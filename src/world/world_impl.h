@@ -3,7 +3,7 @@
 #include <map>
 #include <utility>
 
-#include "step/robot_impl.h"
+#include "world/robot_impl.h"
 
 namespace stickslip {
 
@@ -12,7 +12,7 @@ struct World::Impl {
 
   MaterialPair pair(const std::string& a, const std::string& b) const;
   void refresh_laws();
-  step::RobotData& data(int robot) const { return robots[robot]->impl_->data; }
+  world::RobotData& data(int robot) const { return robots[robot]->impl_->data; }
 
   WorldOptions options;
   step::StepSettings settings;

@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace stickslip::step {
+namespace stickslip::world {
 
 /// What is wrong with position q (nq) and velocity u (nu), as in "q[3] is not finite"; empty where
 /// nothing is.
@@ -13,4 +13,4 @@ std::string state_fault(const Model& model, const double* q, const double* u);
 /// Length of the base quaternion in q; 1 for a fixed base.
 double quaternion_length(const Model& model, const double* q);
 
-}  // namespace stickslip::step
+}  // namespace stickslip::world

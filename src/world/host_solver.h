@@ -4,10 +4,10 @@
 #pragma once
 #include <stickslip/world.h>
 
-#include "step/aligned_block.h"
 #include "step/step_tables.h"
+#include "world/aligned_block.h"
 
-namespace stickslip::step {
+namespace stickslip::world {
 
 class SolverOnHost {
  public:
@@ -15,11 +15,13 @@ class SolverOnHost {
   SolverOnHost(int max_points, const StepSolverOptions& options);
 
   /// What the step calls; valid as long as this object stays where it is.
-  HostSolver view();
+  step::HostSolver view();
 
  private:
-  static HostSolver::Effort run_chain(void* self, DenseProblem& problem, double tolerance);
-  static HostSolver::Effort run_method(void* self, DenseProblem& problem, double tolerance);
+  static step::HostSolver::Effort run_chain(void* self, step::DenseProblem& problem,
+                                            double tolerance);
+  static step::HostSolver::Effort run_method(void* self, step::DenseProblem& problem,
+                                             double tolerance);
 
   StepSolverOptions options_;
   int max_contacts_;
@@ -30,6 +32,6 @@ class SolverOnHost {
 double clock_seconds();
 
 /// What a step reads of a world's options; ground and host solver are the owner's to fill in.
-StepSettings step_settings(const WorldOptions& options);
+step::StepSettings step_settings(const WorldOptions& options);
 
-}  // namespace stickslip::step
+}  // namespace stickslip::world
