@@ -15,16 +15,6 @@
 
 namespace stickslip::benchmarks {
 
-/// Where one environment is in its episodes.
-struct EpisodeClock {
-  int episode = 0;
-  long age = 0;   ///< steps since the episode began
-  long end = 0;   ///< its length; 0: it has not begun
-  int still = 0;  ///< ticks for which every velocity was small
-
-  bool over() const { return age >= end || still > kStillTicks; }
-};
-
 /// T: float or double, the precision of the batch.
 template <class T>
 class BatchEngine {

@@ -45,7 +45,7 @@ UseAllCores::~UseAllCores() { sched_setaffinity(0, sizeof before_, &before_); }
 
 TakeTurns::TakeTurns() : before_(allowed()) {
   // Long against what a move costs, short against a repetition.
-  constexpr auto kTurn = std::chrono::milliseconds(10);
+  constexpr auto kTurn = std::chrono::milliseconds(3);
   mover_ = std::thread([this, kTurn, thread = gettid()] {
     sched_setaffinity(0, sizeof at_start, &at_start);
     std::unique_lock lock(mutex_);

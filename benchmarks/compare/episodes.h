@@ -23,43 +23,44 @@ struct NoObserver {
   void after_step(Engine&, long) {}
 };
 
-/// Runs `steps` steps from the start of episode `episode`; returns the number of the next episode.
-/// An engine has reset(episode), set_target(target), step(), velocities().
+/// Where one robot is in its episodes.
+struct EpisodeClock {
+  int episode = 0;
+  long age = 0;   ///< steps since the episode began
+  long end = 0;   ///< its length; 0: it has not begun
+  int still = 0;  ///< ticks for which every velocity was small
+
+  bool over() const { return age >= end || still > kStillTicks; }
+};
+
+/// Takes `steps` steps from where `clock` is, which moves on; one that is over goes on with the
+/// next episode. An engine has reset(episode), set_target(target), step(), velocities().
 template <class Engine, class Observer>
-int run_episodes(Engine& engine, const Scenario& s, int episode, long steps, Observer&& observer) {
+void run_episodes(Engine& engine, const Scenario& s, EpisodeClock& clock, long steps,
+                  Observer&& observer) {
   std::vector<double> target(s.kp.size());
-  long k = 0;
-  int still = 0;
-  const auto reset = [&] {
-    engine.reset(episode);
-    s.target(episode, 0, target);
+  const auto set_target = [&](long phase) {
+    s.target(clock.episode, static_cast<int>(phase), target);
     engine.set_target(target);
-    observer.begin(engine);
-    k = 0;
-    still = 0;
   };
-  reset();
   for (long i = 0; i < steps; ++i) {
-    if (s.hold_steps && k > 0 && k % s.hold_steps == 0) {
-      s.target(episode, static_cast<int>(k / s.hold_steps), target);
-      engine.set_target(target);
+    if (clock.over()) {
+      clock = {clock.episode + 1, 0, s.episode_steps, 0};
+      engine.reset(clock.episode);
+      set_target(0);
+      observer.begin(engine);
+    } else if (s.hold_steps && clock.age % s.hold_steps == 0) {
+      set_target(clock.age / s.hold_steps);
     }
     engine.step();
-    ++k;
-    observer.after_step(engine, k);
-    bool over = k >= s.episode_steps;
-    if (s.ends_when_still && k % kTick == 0) {
+    ++clock.age;
+    observer.after_step(engine, clock.age);
+    if (s.ends_when_still && clock.age % kTick == 0) {
       double fastest = 0;
       for (const double rate : engine.velocities()) fastest = std::max(fastest, std::fabs(rate));
-      still = fastest < kStill ? still + 1 : 0;
-      over = over || still > kStillTicks;
-    }
-    if (over) {
-      ++episode;
-      reset();
+      clock.still = fastest < kStill ? clock.still + 1 : 0;
     }
   }
-  return episode + 1;
 }
 
 }  // namespace stickslip::benchmarks

@@ -18,11 +18,12 @@ class SingleRunner : public Runner {
   SingleRunner(const Scenario& s, long steps, More... more)
       : engine_(s, more...), scenario_(&s), steps_(steps) {}
 
-  void run() override { next_ = run_episodes(engine_, *scenario_, next_, steps_, NoObserver{}); }
-  void mark() override { mark_ = next_; }
-  void rewind() override { next_ = mark_; }
+  void run() override { run_episodes(engine_, *scenario_, clock_, steps_, NoObserver{}); }
+  /// At the beginning of the next episode.
+  void mark() override { mark_ = clock_ = {clock_.episode}; }
+  void rewind() override { clock_ = mark_; }
   void watch(Observer& observer) override {
-    next_ = run_episodes(engine_, *scenario_, next_, steps_, observer);
+    run_episodes(engine_, *scenario_, clock_, steps_, observer);
   }
   std::uint64_t hash(std::uint64_t seed) const override {
     return hash_of(engine_.velocities(), seed);
@@ -33,7 +34,7 @@ class SingleRunner : public Runner {
   Engine engine_;
   const Scenario* scenario_;
   long steps_;
-  int next_ = 0, mark_ = 0;  // episodes
+  EpisodeClock clock_, mark_;
 };
 
 template <class T>
@@ -42,7 +43,7 @@ class BatchRunner : public Runner {
   BatchRunner(const EngineChoice& choice, const Scenario& s, const Settings& settings)
       : threads_(choice.threads),
         robots_(settings.robots * (choice.wall_clock() ? Settings::kLargeBatch : 1)),
-        steps_(std::max(kTick, settings.steps * Settings::kBatchWork / robots_ / kTick * kTick)) {
+        steps_(std::max(kTick, settings.steps * Settings::work(choice) / robots_ / kTick * kTick)) {
     const auto cores = all_cores();  // its threads inherit them
     engine_.emplace(s, choice, robots_);
   }

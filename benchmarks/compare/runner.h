@@ -8,13 +8,15 @@
 namespace stickslip::benchmarks {
 
 struct Settings {
-  long steps = 20'000;  ///< per repetition; a batch takes kBatchWork times as many robot-steps
-  int repetitions = 7;  ///< counted; one more warms up
-  int robots = 64;      ///< of a batch; kLargeBatch times as many where threads are compared
+  long steps = 2000;     ///< per repetition; a batch takes `work` times as many robot-steps
+  int repetitions = 40;  ///< counted; one more warms up
+  int robots = 64;       ///< of a batch; kLargeBatch times as many where threads are compared
   std::vector<EngineChoice> engines;
   bool statistics = true;
 
-  static constexpr int kBatchWork = 16, kLargeBatch = 16;
+  static constexpr int kLargeBatch = 16;
+  /// Where threads are compared, long against a turn of TakeTurns.
+  static int work(const EngineChoice& e) { return e.wall_clock() ? 40 : 16; }
 };
 
 class Runner {
