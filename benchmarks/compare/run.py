@@ -1,7 +1,7 @@
 """Builds the comparison with MuJoCo, runs it, and writes benchmarks/results/<cpu>/<commit>.json and .md.
 
 Called by `make bench` with the interpreter that has cmake, ninja, urdfdom, mujoco and example-robot-data. Options that are
-not known here go to the program, for instance `--tasks hang --repetitions 15`. `--markdown docs/throughput.md` puts the
+not known here go to the program, for instance `--tasks hang --repetitions 100`. `--markdown docs/throughput.md` puts the
 speeds into that page, `--from results.json` takes them from an earlier run.
 """
 

@@ -114,16 +114,17 @@ STICKSLIP_INLINE Symmetric3<S> zero_symmetric() {
 template <class S>
 struct FactoredContact {
   // Inputs.
-  S friction;          // mu [1]
-  S private_block[6];  // P: xx, xy, xz, yy, yz, zz [1/kg]
-  S offset[3];         // c0 [m/s]
-  S impulse[3];        // in: warm start, out: solution [N s]
-  Mask<S> active;      // false in lanes that do not have this contact
-  int count;           // shared dofs it touches
-  int* index;          // which ones, ascending
-  const bool* odd;     // of the problem's dofs: which of two chains sums it (add_rows)
-  bool alternates;     // index[k] is in chain k & 1
-  Row3<S>* y;          // column k: the three rows at dof index[k] [1/sqrt(kg)]
+  S friction;            // mu [1]
+  S private_block[6];    // P: xx, xy, xz, yy, yz, zz [1/kg]
+  S offset[3];           // c0 [m/s]
+  S impulse[3];          // in: warm start, out: solution [N s]
+  Mask<S> active;        // false in lanes that do not have this contact
+  int count;             // shared dofs it touches
+  int* index;            // which ones, ascending
+  const bool* odd;       // of the problem's dofs: which of two chains sums it (add_rows)
+  bool alternates;       // index[k] is in chain k & 1
+  bool begins_with_six;  // it alternates, and its first dofs are 0 to 5: those of a floating base
+  Row3<S>* y;            // column k: the three rows at dof index[k] [1/sqrt(kg)]
   // Output.
   S velocity[3];  // v_i [m/s]
   // Derived.
@@ -239,6 +240,8 @@ class FactoredProblem {
     c.odd = odd_;
     c.alternates = true;
     for (int k = 0; k < c.count; ++k) c.alternates = c.alternates && odd_[c.index[k]] == (k & 1);
+    c.begins_with_six = c.alternates && c.count >= 6;
+    for (int k = 0; k < 6 && c.begins_with_six; ++k) c.begins_with_six = c.index[k] == k;
   }
 
   /// Makes `coupling` that of the contacts, which are complete.
@@ -327,6 +330,15 @@ class FactoredProblem {
   bool coupled_ = false;
 };
 
+/// The first six terms of `add_rows`, where they are dofs 0 to 5.
+template <class S>
+STICKSLIP_INLINE void add_six_rows(const FactoredContact<S>& c, const S* w, Row3<S>& a,
+                                   Row3<S>& b) {
+  a = madd(c.y[0], w[0], a), b = madd(c.y[1], w[1], b);
+  a = madd(c.y[2], w[2], a), b = madd(c.y[3], w[3], b);
+  a = madd(c.y[4], w[4], a), b = madd(c.y[5], w[5], b);
+}
+
 /// Y w of a contact on top of `start`: even and odd dofs in two chains, which halves the latency. M
 /// = 6: all six dofs, unrolled; M = 0: by index.
 template <int M, class S>
@@ -334,11 +346,11 @@ STICKSLIP_INLINE Row3<S> add_rows(const FactoredContact<S>& c, const S* w, const
   const S zero = constant<S>(0);
   Row3<S> a = start, b = make_row3(zero, zero, zero);
   if constexpr (M == 6) {
-    a = madd(c.y[0], w[0], a), b = madd(c.y[1], w[1], b);
-    a = madd(c.y[2], w[2], a), b = madd(c.y[3], w[3], b);
-    a = madd(c.y[4], w[4], a), b = madd(c.y[5], w[5], b);
+    add_six_rows(c, w, a, b);
   } else if (c.alternates) {
-    for (int k = 0; k + 1 < c.count; k += 2) {
+    int k = 0;
+    if (c.begins_with_six) add_six_rows(c, w, a, b), k = 6;
+    for (; k + 1 < c.count; k += 2) {
       a = madd(c.y[k], w[c.index[k]], a);
       b = madd(c.y[k + 1], w[c.index[k + 1]], b);
     }
@@ -354,18 +366,27 @@ STICKSLIP_INLINE Row3<S> add_rows(const FactoredContact<S>& c, const S* w, const
   return a + b;
 }
 
+/// target += Y^T d, in one chunk: t is its place in target.
+template <int M, class S>
+STICKSLIP_INLINE void add_transposed_chunk(const FactoredContact<S>& c, const S d[3], int chunk,
+                                           S* t) {
+  Chunk<S> v = load_chunk(t);
+#pragma GCC unroll 3
+  for (int r = 0; r < 3; ++r) v = madd_chunk<S>(row_chunk<M>(c, r, chunk), d[r], v);
+  store_chunk(t, v);
+}
+
 /// target += Y^T d.
 template <int M, class S>
 STICKSLIP_INLINE void add_transposed(const FactoredContact<S>& c, const S d[3], S* target) {
   const int chunks = chunk_count<M>(c);
+  int j = 0;
+  if constexpr (M == 0 && kChunk<S> == 1)
+    if (c.begins_with_six)
 #pragma GCC unroll 6
-  for (int j = 0; j < chunks; ++j) {
-    S* t = target + first_dof<M>(c, j);
-    Chunk<S> v = load_chunk(t);
-#pragma GCC unroll 3
-    for (int r = 0; r < 3; ++r) v = madd_chunk<S>(row_chunk<M>(c, r, j), d[r], v);
-    store_chunk(t, v);
-  }
+      for (; j < 6; ++j) add_transposed_chunk<M>(c, d, j, target + j);
+#pragma GCC unroll 6
+  for (; j < chunks; ++j) add_transposed_chunk<M>(c, d, j, target + first_dof<M>(c, j));
 }
 
 /// v_i = c0 + Y w + P lambda.

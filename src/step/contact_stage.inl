@@ -181,14 +181,28 @@ bool ContactStage<S>::apart() const {
 }
 
 template <class S>
+int ContactStage<S>::next_link(int i) const {
+  const auto body = [&](int k) { return tables_->shapes[active_[k].shape].body; };
+  int end = i + 1;
+  while (end < count_ && body(end) == body(i)) ++end;
+  return end;
+}
+
+template <class S>
 void ContactStage<S>::find_shared_joints() {
   for (int k = 0; k < links(); ++k) once_[k] = shared_[k] = none<S>(), dof_[k] = -1;
-  for (int i = 0; i < count_; ++i) {
-    const ActiveContact<S>& a = active_[i];
-    for (int k = 0; k < a.rows.depth; ++k) {
-      const int j = flat(a.rows.path[k]);
-      shared_[j] = shared_[j] | (once_[j] & a.active);
-      once_[j] = once_[j] | a.active;
+  for (int first = 0, end; first < count_; first = end) {
+    end = next_link(first);
+    Mask<S> once = none<S>(), twice = none<S>();
+    for (int i = first; i < end; ++i) {
+      twice = twice | (once & active_[i].active);
+      once = once | active_[i].active;
+    }
+    const dynamics::ContactRows<S>& rows = active_[first].rows;
+    for (int k = 0; k < rows.depth; ++k) {
+      const int j = flat(rows.path[k]);
+      shared_[j] = shared_[j] | twice | (once_[j] & once);
+      once_[j] = once_[j] | once;
     }
   }
 }
@@ -198,7 +212,7 @@ void ContactStage<S>::find_shared_joints() {
 template <class S>
 void ContactStage<S>::number_shared_dofs(const dynamics::Tree<S>& tree) {
   const auto joint = [&](dynamics::LinkIndex l) { return tree.slots[l.slot].joint[l.lane]; };
-  for (int i = 0; i < count_; ++i)
+  for (int i = 0; i < count_; i = next_link(i))
     for (int k = 0; k < active_[i].rows.depth; ++k) {
       const dynamics::LinkIndex link = active_[i].rows.path[k];
       if (dof_[flat(link)] >= 0 || !any(shared_[flat(link)])) continue;
