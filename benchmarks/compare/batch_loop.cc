@@ -91,6 +91,7 @@ void BatchEngine<T>::prepare(long steps) {
   if (!moving()) return;
   std::vector<EpisodeClock> clocks = clocks_;
   script_.clear();
+  scripted_ = 0;
   for (long done = 0; done < steps; done += kTick) {
     for (int e = 0; e < num_envs_; ++e) {
       EpisodeClock& clock = clocks[e];

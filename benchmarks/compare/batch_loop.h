@@ -72,6 +72,7 @@ class BatchEngine {
 
   std::vector<EpisodeClock> clocks_;
   std::vector<T> script_;  // targets of the coming ticks, (ticks, num_envs, joints)
+  size_t scripted_ = 0;    // how far it was followed
   std::vector<T> last_;    // those of the last tick that was laid out
   // of reset_finished and observe, here so that a step allocates nothing
   std::vector<std::int64_t> finished_;
@@ -90,14 +91,13 @@ class BatchEngine {
 template <class T>
 template <class Observer>
 void BatchEngine<T>::run(long steps, Observer&& observer) {
-  const T* targets = script_.data();
   for (long done = 0; done < steps;) {
     for (const EpisodeClock& clock : clocks_)
       if (clock.over()) observer.begin(*this);
     reset_finished();
     if (moving()) {
-      set_targets(targets);
-      targets += static_cast<long>(num_envs_) * joints_;
+      set_targets(script_.data() + scripted_);
+      scripted_ += static_cast<size_t>(num_envs_) * joints_;
     }
     const long n = std::min(steps - done, next_event());
     take(n, observer);

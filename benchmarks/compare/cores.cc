@@ -1,8 +1,6 @@
 #include "benchmarks/compare/cores.h"
 
-#include <unistd.h>
-
-#include <chrono>
+#include <algorithm>
 #include <cstdio>
 
 namespace stickslip::benchmarks {
@@ -17,19 +15,14 @@ cpu_set_t allowed() {
 
 const cpu_set_t at_start = allowed();
 
-cpu_set_t only(int core) {
-  cpu_set_t set;
-  CPU_ZERO(&set);
-  CPU_SET(core, &set);
-  return set;
-}
-
 }  // namespace
 
 int pin(int core) {
   if (core == -2) core = CPU_ISSET(1, &at_start) ? 1 : 0;
   if (core < 0) return -1;
-  const cpu_set_t set = only(core);
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  CPU_SET(core, &set);
   if (sched_setaffinity(0, sizeof set, &set) != 0) {
     std::printf("could not pin to core %d; running unpinned\n", core);
     return -1;
@@ -37,35 +30,19 @@ int pin(int core) {
   return core;
 }
 
-UseAllCores::UseAllCores() : before_(allowed()) {
-  sched_setaffinity(0, sizeof at_start, &at_start);
-}
+int num_cores() { return std::max(1, CPU_COUNT(&at_start)); }
 
-UseAllCores::~UseAllCores() { sched_setaffinity(0, sizeof before_, &before_); }
-
-TakeTurns::TakeTurns() : before_(allowed()) {
-  // Long against what a move costs, short against a repetition.
-  constexpr auto kTurn = std::chrono::milliseconds(3);
-  mover_ = std::thread([this, kTurn, thread = gettid()] {
-    sched_setaffinity(0, sizeof at_start, &at_start);
-    std::unique_lock lock(mutex_);
-    for (int core = 0; !over_; core = (core + 1) % CPU_SETSIZE) {
-      if (!CPU_ISSET(core, &at_start)) continue;
-      const cpu_set_t here = only(core);
-      sched_setaffinity(thread, sizeof here, &here);
-      end_.wait_for(lock, kTurn, [this] { return over_; });
+OnCores::OnCores(int first, int count) : before_(allowed()) {
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  for (int core = 0, k = 0; core < CPU_SETSIZE; ++core)
+    if (CPU_ISSET(core, &at_start)) {
+      if (k >= first && k < first + count) CPU_SET(core, &set);
+      ++k;
     }
-  });
+  sched_setaffinity(0, sizeof set, CPU_COUNT(&set) == count ? &set : &at_start);
 }
 
-TakeTurns::~TakeTurns() {
-  {
-    const std::lock_guard lock(mutex_);
-    over_ = true;
-  }
-  end_.notify_one();
-  mover_.join();
-  sched_setaffinity(0, sizeof before_, &before_);
-}
+OnCores::~OnCores() { sched_setaffinity(0, sizeof before_, &before_); }
 
 }  // namespace stickslip::benchmarks

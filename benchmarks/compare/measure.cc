@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <numeric>
 
 #include "benchmarks/compare/agreement.h"
 
@@ -37,23 +38,35 @@ struct Contestant {
 };
 
 struct Seconds {
-  double cpu = 0, wall = 0;  // of single threads
+  double cpu = 0, wall = 0;  // of those that are pinned
 };
 
 /// One repetition.
 void time(Contestant& c, bool counted, Seconds& total) {
   c.runner->prepare();
-  const double cpu = cpu_seconds(), wall = wall_seconds();
-  c.runner->run();
-  const double took = wall_seconds() - wall, worked = cpu_seconds() - cpu;
-  if (c.choice.threads <= 1) {
-    total.cpu += worked;
-    total.wall += took;
+  const int parts = c.runner->parts();
+  double speed = 0;  // robot-steps per second
+  for (int part = 0; part < parts; ++part) {
+    const auto cores = c.runner->cores(part);
+    const double cpu = cpu_seconds(), wall = wall_seconds();
+    c.runner->run();
+    const double took = wall_seconds() - wall, worked = cpu_seconds() - cpu;
+    if (!c.choice.wall_clock()) {
+      total.cpu += worked;
+      total.wall += took;
+    }
+    const double share = static_cast<double>(c.runner->robot_steps()) / parts;
+    speed += share / (c.choice.wall_clock() ? took : worked) / parts;
   }
   if (!counted) return;
-  c.microseconds.push_back(1e6 * (c.choice.wall_clock() ? took : worked) /
-                           static_cast<double>(c.runner->robot_steps()));
+  c.microseconds.push_back(1e6 / speed);
   c.hash = c.runner->hash(c.hash);
+}
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const size_t n = values.size();
+  return 0.5 * (values[(n - 1) / 2] + values[n / 2]);
 }
 
 /// The counted repetitions again, observed; returns the hash.
@@ -105,11 +118,11 @@ void compare_hashes(std::vector<Measurement>& engines) {
 
 }  // namespace
 
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  std::sort(values.begin(), values.end());
-  const size_t n = values.size();
-  return 0.5 * (values[(n - 1) / 2] + values[n / 2]);
+double Measurement::microseconds_per_step() const {
+  if (microseconds.empty()) return 0;
+  if (engine.wall_clock()) return median(microseconds);
+  return std::accumulate(microseconds.begin(), microseconds.end(), 0.0) /
+         static_cast<double>(microseconds.size());
 }
 
 const Measurement* ScenarioResult::find(const std::string& engine) const {
@@ -120,7 +133,9 @@ const Measurement* ScenarioResult::find(const std::string& engine) const {
 
 double ScenarioResult::ratio(const Measurement& m) const {
   const Measurement* theirs = find(aim(m).against);
-  if (!theirs || theirs->microseconds.size() != m.microseconds.size()) return 0;
+  if (!theirs || theirs->microseconds.size() != m.microseconds.size() || m.microseconds.empty())
+    return 0;
+  if (!m.engine.wall_clock()) return theirs->microseconds_per_step() / m.microseconds_per_step();
   std::vector<double> ratios;
   for (size_t k = 0; k < m.microseconds.size(); ++k)
     ratios.push_back(theirs->microseconds[k] / m.microseconds[k]);

@@ -12,6 +12,10 @@ struct Measurement {
   std::vector<double> microseconds;  ///< per robot-step, one per repetition
   Findings findings;
   std::vector<std::string> faults;  ///< why the result does not count; empty: it does
+
+  /// Mean over the repetitions: an episode has costly and cheap phases. Of wall time, which knows
+  /// interruptions, the median.
+  double microseconds_per_step() const;
 };
 
 struct ScenarioResult {
@@ -22,13 +26,11 @@ struct ScenarioResult {
 
   const Measurement* find(const std::string& engine) const;
   Aim aim(const Measurement& m) const { return aim_of(m.engine, *scenario, m.instruction_set); }
-  /// The time per robot-step of the engine that m is compared with over m's: median over the
-  /// repetitions of the ratio of two runs of the same round. 0 where there is none.
+  /// The time per robot-step of the engine that m is compared with over m's; of wall times the
+  /// median over the repetitions. 0 where there is none.
   double ratio(const Measurement& m) const;
   bool misses_aim(const Measurement& m) const;
 };
-
-double median(std::vector<double> values);
 
 ScenarioResult measure(const Scenario& scenario, const Settings& settings);
 

@@ -43,7 +43,7 @@ std::string json_of(const ScenarioResult& r, const Measurement& m) {
   const auto add = [&](const char* key, const std::string& value) {
     out += std::string(", \"") + key + "\": " + value;
   };
-  const double us = median(m.microseconds);
+  const double us = m.microseconds_per_step();
   add("us_per_step", number(us));
   add("us_per_repetition", list(m.microseconds, number));
   add("robot_steps_per_s", number(us > 0 ? 1e6 / us : 0));
@@ -116,7 +116,7 @@ std::string residual_text(const Measurement& m) {
 void print_header() {
   std::printf(kLine, "task", "engine", "us/step", "min", "million", "ratio", "aim", "contact",
               "pushing", "iter", "penetration mm", "energy J", "residual m/s");
-  std::printf(kLine, "", "", "median", "", "steps/s", "", "", "in solve", "", "", "mean / max",
+  std::printf(kLine, "", "", "mean", "", "steps/s", "", "", "in solve", "", "", "mean / max",
               "settled -> end", "99.99 % / max (share>tol)");
 }
 
@@ -124,7 +124,7 @@ void print_result(const ScenarioResult& r) {
   for (const Measurement& m : r.engines) {
     if (m.microseconds.empty()) continue;  // print_faults says why
     const Findings& f = m.findings;
-    const double us = median(m.microseconds);
+    const double us = m.microseconds_per_step();
     const double least = *std::min_element(m.microseconds.begin(), m.microseconds.end());
     std::printf(
         kLine, r.scenario->name.c_str(), m.engine.name.c_str(), format("%.3f", us).c_str(),

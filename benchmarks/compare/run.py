@@ -83,7 +83,7 @@ def markdown(data: dict) -> str:
         f"# stickslip and MuJoCo {data['mujoco']}",
         "",
         f"{measured_on(data)}, {data['compiler']}. dt = 1 ms, "
-        f"{data['repetitions']} repetitions of {data['steps']} steps in turns, batches of {data['robots']} robots; medians. "
+        f"{data['repetitions']} repetitions of {data['steps']} steps in turns, batches of {data['robots']} robots. "
         "`benchmarks/README.md` has the rules.",
         "",
         "| task | engine | us/step | steps/s | ratio | aim | contacts | pushing | penetration mean / max [mm] | energy [J] | residual 99.99 % / max [m/s] (share above) |",
@@ -96,7 +96,9 @@ def markdown(data: dict) -> str:
 
 
 def measured_on(data: dict) -> str:
-    return f"{data['date']}, commit {data['commit']}, {data['cpu']}"
+    """When, with what and where; batches that do not say otherwise run on the widest instructions there."""
+    widest = next((e["instruction_set"] for r in data["results"] for e in r["engines"] if e.get("instruction_set")), "")
+    return f"{data['date']}, commit {data['commit']}, {data['cpu']}" + (f" with {widest}" if widest else "")
 
 
 def cells(e: dict) -> list[str]:

@@ -3,7 +3,6 @@
 #include <optional>
 
 #include "benchmarks/compare/batch_loop.h"
-#include "benchmarks/compare/cores.h"
 #include "benchmarks/compare/mujoco_loop.h"
 #include "benchmarks/compare/stickslip_loop.h"
 
@@ -34,47 +33,57 @@ class SingleRunner : public Runner {
   Engine engine_;
   const Scenario* scenario_;
   long steps_;
-  EpisodeClock clock_, mark_;
+  EpisodeClock clock_{-1}, mark_;
 };
 
+/// Threads have as many cores; one thread that several are compared with has each of theirs in
+/// turn, because the cores of a shared machine differ.
 template <class T>
 class BatchRunner : public Runner {
  public:
   BatchRunner(const EngineChoice& choice, const Scenario& s, const Settings& settings)
       : threads_(choice.threads),
+        shared_(choice.wall_clock() ? most_threads(settings) : 1),
         robots_(settings.robots * (choice.wall_clock() ? Settings::kLargeBatch : 1)),
-        steps_(std::max(kTick, settings.steps * Settings::work(choice) / robots_ / kTick * kTick)) {
-    const auto cores = all_cores();  // its threads inherit them
+        part_steps_(std::max(kTick, settings.steps * work() / robots_ / shared_ / kTick * kTick)) {
+    const auto its_cores = cores(0);  // its threads inherit them
     engine_.emplace(s, choice, robots_);
   }
 
-  void prepare() override { engine_->prepare(steps_); }
+  int parts() const override { return threads_ == 1 ? shared_ : 1; }
+  std::unique_ptr<OnCores> cores(int part) const override {
+    if (threads_ == 0) return nullptr;
+    return std::make_unique<OnCores>(part, threads_);
+  }
+  void prepare() override { engine_->prepare(robot_steps() / robots_); }
   void run() override {
-    const auto cores = all_cores();
-    const auto turns = threads_ == 1 ? std::make_unique<TakeTurns>() : nullptr;
     NoObserver nobody;
-    engine_->run(steps_, nobody);
+    engine_->run(part_steps_ * (shared_ / parts()), nobody);
   }
   void mark() override { engine_->mark(); }
   void rewind() override { engine_->rewind(); }
   void watch(Observer& observer) override {
-    const auto cores = all_cores();
-    engine_->prepare(steps_);
-    engine_->run(steps_, observer);
+    const auto its_cores = cores(0);
+    engine_->prepare(robot_steps() / robots_);
+    engine_->run(robot_steps() / robots_, observer);
   }
   std::uint64_t hash(std::uint64_t seed) const override { return engine_->hash(seed); }
-  long robot_steps() const override { return steps_ * robots_; }
+  long robot_steps() const override { return part_steps_ * shared_ * robots_; }
   int robots() const override { return robots_; }
   std::string instruction_set() const override { return engine_->batch().instruction_set(); }
 
  private:
-  std::unique_ptr<UseAllCores> all_cores() const {
-    return threads_ > 1 ? std::make_unique<UseAllCores>() : nullptr;
+  int work() const { return threads_ > 0 ? Settings::kThreadWork : Settings::kBatchWork; }
+  static int most_threads(const Settings& settings) {
+    int most = 1;
+    for (const EngineChoice& e : settings.engines) most = std::max(most, e.threads);
+    return std::min(most, num_cores());
   }
 
   int threads_;  // 0: one, on the core of everybody else
+  int shared_;   // cores of the engine with the most threads
   int robots_;
-  long steps_;
+  long part_steps_;
   std::optional<BatchEngine<T>> engine_;
 };
 

@@ -2,28 +2,32 @@
 #pragma once
 #include <memory>
 
+#include "benchmarks/compare/cores.h"
 #include "benchmarks/compare/engine_choice.h"
 #include "benchmarks/compare/observer.h"
 
 namespace stickslip::benchmarks {
 
 struct Settings {
-  long steps = 2000;     ///< per repetition; a batch takes `work` times as many robot-steps
+  long steps = 2000;     ///< per repetition; a batch takes kBatchWork times as many robot-steps
   int repetitions = 40;  ///< counted; one more warms up
   int robots = 64;       ///< of a batch; kLargeBatch times as many where threads are compared
   std::vector<EngineChoice> engines;
   bool statistics = true;
 
-  static constexpr int kLargeBatch = 16;
-  /// Where threads are compared, long against a turn of TakeTurns.
-  static int work(const EngineChoice& e) { return e.wall_clock() ? 40 : 16; }
+  static constexpr int kBatchWork = 16, kLargeBatch = 16;
+  static constexpr int kThreadWork = 40;  // instead: long against a move to another core
 };
 
 class Runner {
  public:
   virtual ~Runner() = default;
+  /// A repetition may come in parts of equal length on different cores: its speed is their mean.
+  virtual int parts() const { return 1; }
+  /// What a part runs on as long as it lives; null: where everybody else does.
+  virtual std::unique_ptr<OnCores> cores(int) const { return nullptr; }
   virtual void prepare() {}  ///< for the next repetition; not timed
-  virtual void run() = 0;    ///< one repetition
+  virtual void run() = 0;    ///< the next part of a repetition
   virtual void mark() = 0;   ///< here the first counted repetition begins
   virtual void rewind() = 0;
   virtual void watch(Observer& observer) = 0;  ///< one repetition, observed

@@ -27,13 +27,7 @@ STICKSLIP_INLINE Vec3<S> shape_center(const dynamics::Tree<S>& tree, const Groun
   return dynamics::point_position(tree, shape.link, constant3<S>(shape.center));
 }
 
-/// Rotation of the link and of the shape on it.
-template <class S>
-STICKSLIP_INLINE Mat3<S> link_rotation(const dynamics::Tree<S>& tree, const GroundShape& shape) {
-  if (shape.link.slot == dynamics::kBaseSlot) return tree.base.rotation;
-  return dynamics::field_of<S, Mat3>(tree, shape.link,
-                                     &dynamics::LinkState<dynamics::Wide<S>>::rotation);
-}
+/// Of the shape on its link.
 template <class S>
 STICKSLIP_INLINE Mat3<S> shape_rotation(const GroundShape& shape) {
   Mat3<S> axes;
@@ -45,16 +39,9 @@ STICKSLIP_INLINE Mat3<S> shape_rotation(const GroundShape& shape) {
 /// far from the ground needs.
 template <class S>
 STICKSLIP_INLINE S lowest_point(const dynamics::Tree<S>& tree, const GroundShape& shape) {
-  const Mat3<S> rotation = link_rotation(tree, shape);
-  const Vec3<S> up{rotation.m[6], rotation.m[7], rotation.m[8]};  // heights of the link's axes
-  const Vec3<S> c = constant3<S>(shape.center);
-  const S origin = shape.link.slot == dynamics::kBaseSlot
-                       ? constant<S>(0)
-                       : dynamics::field_of<S, Vec3>(
-                             tree, shape.link, &dynamics::LinkState<dynamics::Wide<S>>::position)
-                             .z;
-  const S center = madd(up.z, c.z, madd(up.y, c.y, madd(up.x, c.x, origin)));
+  const S center = dynamics::point_height(tree, shape.link, constant3<S>(shape.center));
   if (shape.type == ShapeType::kSphere) return center - constant<S>(shape.radius);
+  const Vec3<S> up = dynamics::heights_of_axes(tree, shape.link);
   const Mat3<S> axes = shape_rotation<S>(shape);
   const auto reach = [&](int k) {
     return abs(dot(up, column(axes, k))) * constant<S>(shape.half[k]);
@@ -70,7 +57,7 @@ PlacedShape<S> place(const dynamics::Tree<S>& tree, const GroundShape& shape) {
   PlacedShape<S> p;
   p.center = shape_center(tree, shape);
   if (shape.type != ShapeType::kSphere)
-    p.axes = link_rotation(tree, shape) * shape_rotation<S>(shape);
+    p.axes = dynamics::link_rotation(tree, shape.link) * shape_rotation<S>(shape);
   return p;
 }
 

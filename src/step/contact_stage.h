@@ -110,7 +110,7 @@ class ContactStage {
   void compute_rows(dynamics::Tree<S>& tree);
   /// Whether no two of the points in the list can have a joint in common.
   bool apart() const;
-  /// The first contact after i that is on another link.
+  /// The first contact after i that is on another body.
   int next_link(int i) const;
   void find_shared_joints();
   void number_shared_dofs(const dynamics::Tree<S>& tree);

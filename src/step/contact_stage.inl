@@ -266,10 +266,10 @@ void ContactStage<S>::fill_contact(const dynamics::Tree<S>& tree, const ActiveCo
   contact::FactoredContact<S>& c = problem_.contact(number);  // its base columns are there already
   Row3<S> offset = make_row3(a.velocity.x, a.velocity.y, a.velocity.z + a.shift);
   contact::Symmetric3<S> own = contact::zero_symmetric<S>();  // the private block
-  const auto keep = [&](dynamics::LinkIndex link, const Row3<S>& row) STICKSLIP_LAMBDA {
+  const auto add_private = [&](dynamics::LinkIndex link, const Row3<S>& row) STICKSLIP_LAMBDA {
     own.add_square(row);
-    const S x = with_x ? dynamics::lane_of<S>(tree.links[link.slot].x, link.lane) : constant<S>(0);
-    offset = madd(row, x, offset);
+    if (with_x)
+      offset = madd(row, dynamics::lane_of<S>(tree.links[link.slot].x, link.lane), offset);
   };
   int touched = tables_->floating ? 6 : 0;
   if (num_shared_ > 0) {
@@ -279,16 +279,16 @@ void ContactStage<S>::fill_contact(const dynamics::Tree<S>& tree, const ActiveCo
       const Row3<S>& row = a.rows.joint[k];
       const int dof = shared_dof(link);
       if (dof < 0) {
-        keep(link, row);
+        add_private(link, row);
         continue;
       }
       const Mask<S> shared = shared_[flat(link)];
       c.y[touched] = row_where(shared, row);
       index_[touched++] = dof;
-      if (any(a.active & !shared)) keep(link, row_where(!shared, row));
+      if (any(a.active & !shared)) add_private(link, row_where(!shared, row));
     }
   } else {
-    for (int k = a.rows.depth - 1; k >= 0; --k) keep(a.rows.path[k], a.rows.joint[k]);
+    for (int k = a.rows.depth - 1; k >= 0; --k) add_private(a.rows.path[k], a.rows.joint[k]);
   }
   if (num_shared_ > 0 || !tables_->floating) problem_.set_index(number, index_, touched);
   own.store_to(c.private_block);
