@@ -114,18 +114,17 @@ STICKSLIP_INLINE Symmetric3<S> zero_symmetric() {
 template <class S>
 struct FactoredContact {
   // Inputs.
-  S friction;          // mu [1]
-  S private_block[6];  // P: xx, xy, xz, yy, yz, zz [1/kg]
-  S offset[3];         // c0 [m/s]
-  S impulse[3];        // in: warm start, out: solution [N s]
-  Mask<S> active;      // false in lanes that do not have this contact
-  int count;           // shared dofs it touches
-  int* index;          // which ones, ascending
-  const bool* odd;     // of the problem's dofs: which of two chains sums it (add_rows)
-  bool alternates;     // index[k] is in chain k & 1
-  bool
-      begins_with_six;  // it alternates, and its first dofs are 0 to 5 (of a floating base, mostly)
-  Row3<S>* y;           // column k: the three rows at dof index[k] [1/sqrt(kg)]
+  S friction;            // mu [1]
+  S private_block[6];    // P: xx, xy, xz, yy, yz, zz [1/kg]
+  S offset[3];           // c0 [m/s]
+  S impulse[3];          // in: warm start, out: solution [N s]
+  Mask<S> active;        // false in lanes that do not have this contact
+  int count;             // shared dofs it touches
+  int* index;            // which ones, ascending
+  const bool* odd;       // of the problem's dofs: which of two chains sums it (add_rows)
+  bool alternates;       // index[k] is in chain k & 1
+  bool begins_with_six;  // alternates, first dofs 0 to 5 (a floating base)
+  Row3<S>* y;            // column k: the three rows at dof index[k] [1/sqrt(kg)]
   // Output.
   S velocity[3];  // v_i [m/s]
   // Derived.
