@@ -15,6 +15,7 @@ class Coupling {
     const int words = (dofs + kBits - 1) / kBits;
     rows_ = arena.take<Word>(long(dofs) * words);
     touched_ = arena.take<Word>(words);
+    before_ = arena.take<Word>(words);
     lists_ = arena.take<int>(long(dofs) * dofs);
     count_ = arena.take<int>(dofs);
     added_ = arena.take<int>(1 + long(contacts) * (1 + dofs));
@@ -45,10 +46,13 @@ class Coupling {
     length_ = end_;
     words_ = (m_ + kBits - 1) / kBits;
     for (int k = 0; k < m_ * words_; ++k) rows_[k] = 0;
+    for (int w = 0; w < words_; ++w) touched_[w] = 0;
     for (int at = 1; at < length_; at += 1 + added_[at]) couple(added_ + at + 1, added_[at]);
     eliminate();
   }
 
+  /// Whether any contact touches j; else it is not part of the matrix.
+  bool touched(int j) const { return touched_[j / kBits] >> j % kBits & 1; }
   /// The dofs before j that it couples with when its turn comes, ascending.
   const int* list(int j) const { return lists_ + j * m_; }
   int count(int j) const { return count_[j]; }
@@ -67,13 +71,13 @@ class Coupling {
     return j > 0 && count_[j] == count_[j - 1] + 1 && list(j)[count_[j] - 1] == j - 1;
   }
   void couple(const int* index, int count) {
-    for (int w = 0; w < words_; ++w) touched_[w] = 0;
+    for (int w = 0; w < words_; ++w) before_[w] = 0;
     for (int k = 0; k < count; ++k) {
-      // What is there so far comes before index[k].
       Word* row = rows_ + index[k] * words_;
-      for (int w = 0; w < words_; ++w) row[w] |= touched_[w];
-      touched_[index[k] / kBits] |= Word(1) << index[k] % kBits;
+      for (int w = 0; w < words_; ++w) row[w] |= before_[w];
+      before_[index[k] / kBits] |= Word(1) << index[k] % kBits;
     }
+    for (int w = 0; w < words_; ++w) touched_[w] |= before_[w];
   }
   /// Fills in what elimination couples, and writes the lists.
   void eliminate() {
@@ -97,8 +101,9 @@ class Coupling {
   int* added_ = nullptr;  // m, then of each contact unlike the one before: count, dofs
   int length_ = 0;        // of what the lists were made from
   int end_ = 0, last_ = 0;
-  bool same_ = false;                          // so far
-  Word *rows_ = nullptr, *touched_ = nullptr;  // (dofs, words): sets of dofs
+  bool same_ = false;                            // so far
+  Word* rows_ = nullptr;                         // (dofs, words): sets of dofs
+  Word *touched_ = nullptr, *before_ = nullptr;  // by any contact, by one so far
   int *lists_ = nullptr, *count_ = nullptr;
 };
 

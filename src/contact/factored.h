@@ -3,14 +3,17 @@
 // impulse found, its residual, and whether it is good enough.
 //
 // Rule between sweeps and Newton steps, per lane: with e_k the largest velocity change of sweep k,
-// e_k^2 / e_(k-1) is what the next one is expected to change. Where that is above the tolerance, a
-// Newton step comes before the next sweep; else it is swept again. Or, with `foresee`, not at all,
-// if no Newton step lay between the last two sweeps: the lane stops, and goes on only if the
-// certificate says that it should have. Maximum dissipation ([Hwangbo 2018] eq. 8) is not a
-// complementarity problem in the velocity, so the Newton finish and the fallback do not apply: it
-// sweeps to the end, and its residual is |G_ii (lambda_i - local_i)|.
+// e_k^2 / e_(k-1) is what the next one is expected to change. Where that is above the tolerance
+// after every third sweep, or each late one, a Newton step comes next, and where the certificate
+// then finds well below the allowed residual the lane is done. Else it is swept again. Or, with
+// `foresee`, if no Newton step lay between the last two sweeps, not at all: the lane stops, and
+// goes on only if the certificate says that it should have. Every third: a step costs several
+// sweeps, and lanes of a pack that need one take it together. Maximum dissipation ([Hwangbo 2018]
+// eq. 8) is not a complementarity problem in the velocity, so the Newton finish and the fallback do
+// not apply: it sweeps to the end, and its residual is |G_ii (lambda_i - local_i)|.
 #pragma once
 #include "contact/jam.h"
+#include "contact/newton_bodies.h"
 #include "contact/one_lane.h"
 
 namespace stickslip::contact::inline STICKSLIP_KERNELS {
@@ -24,9 +27,10 @@ struct FactoredOptions {
       0;  ///< ... plus this much of the largest free contact velocity (float needs it)
   double alpha = 1e-6;        ///< proximal weight of a first Newton step ...
   double alpha_again = 1e-6;  ///< ... of those after another sweep ...
-  double alpha_late = 1e-5;   ///< ... and from this sweep on
-  int late = 8;
-  int max_sweeps = 16;  ///< before the fallback; maximum dissipation takes up to 100 times as many
+  double alpha_late = 1e-5;   ///< ... and from this sweep on, after each
+  int late = 9;
+  double enough = 1e-4;  ///< done: residual after a Newton step, in terms of the allowed one
+  int max_sweeps = 24;   ///< before the fallback; maximum dissipation takes up to 100 times as many
   /// Leaves out a sweep that is expected to change less than the tolerance. For tolerances that the
   /// certificate can vouch for, with residual_tolerance.
   bool foresee = true;
@@ -44,13 +48,13 @@ FactoredOptions default_options() {
     // It doubles the share of a humanoid's steps that double judges above 1e-5 m/s.
     o.foresee = false;
     // With less weight, Newton steps chase the rounding of redundant contacts; with more, they
-    // creep where robots hang and slide. What is not solved after twelve sweeps seldom is (measured
-    // on the tasks of benchmarks/compare and benchmarks/micro/lane_kernels.cc).
+    // creep where robots hang and slide. What is not solved after 24 sweeps seldom is (measured on
+    // the tasks of benchmarks/compare and benchmarks/micro/lane_kernels.cc).
     o.alpha = 5e-5;
     o.alpha_again = 1e-3;
     o.alpha_late = 5e-3;
-    o.late = 5;
-    o.max_sweeps = 12;
+    o.enough = 0.1;
+    o.max_sweeps = 24;
   }
   return o;
 }
@@ -61,7 +65,8 @@ struct FactoredInfo {
   S allowed;          // what it may be [m/s]
   Mask<S> converged;  // residual within tolerance; false where an input is not finite (then the
                       // impulses are zero)
-  int sweeps = 0;     // passes over all contacts
+  bool certified = false;  // the residual is that of the present impulses
+  int sweeps = 0;          // passes over all contacts
   int newton_steps = 0;
   int resumed = 0;    // solves that went on after a sweep was left out in vain
   int fallbacks = 0;  // lanes that needed it
@@ -127,38 +132,50 @@ STICKSLIP_STAGE S certify(FactoredProblem<S>& p) {
   }
 }
 
-/// Sweeps and Newton steps until in every lane of `live` the change is small or, with `foresee`,
-/// that of the next sweep is expected to be; or the cap. Returns the lanes that stopped so.
+/// One guarded Newton step on the lanes `live`, in the form that suits the problem.
+template <int M, class S>
+STICKSLIP_INLINE void step_of(FactoredProblem<S>& p, Mask<S> live, S alpha) {
+  if (M == 0 && p.num_bodies() > 0)
+    newton_step_by_bodies(p, live, alpha);
+  else
+    newton_step<M>(p, live, alpha);
+}
+
+/// Sweeps and Newton steps until in every lane of `live` the change is small, or the residual after
+/// a Newton step is at most `enough`, or, with `foresee`, the next sweep is expected to change
+/// little; or the cap. Returns the lanes that were foreseen.
 template <int M, bool kMaxDissipation, class S>
-STICKSLIP_STAGE Mask<S> iterate(FactoredProblem<S>& p, Mask<S> live, S tolerance_squared,
+STICKSLIP_STAGE Mask<S> iterate(FactoredProblem<S>& p, Mask<S> live, S tolerance_squared, S enough,
                                 bool foresee, const FactoredOptions& o, FactoredInfo<S>& info) {
+  constexpr int kEvery = 3;
   const S speed = constant<S>(0.1) * sqrt(tolerance_squared);
   S before = constant<S>(1e30);
   Mask<S> only_swept = live, foreseen = live & !live;
   const int cap = kMaxDissipation ? 100 * o.max_sweeps : o.max_sweeps;
   for (int k = 1;; ++k) {
     const S change = sweep<M, kMaxDissipation>(p, live, speed);
+    info.certified = false;
     ++info.sweeps;
     live = live & (change > tolerance_squared);
-    auto slow = live;
-    if (!kMaxDissipation && k >= 2) {
-      slow = live & (change * change > tolerance_squared * before);
-      if (foresee) {
-        const auto stops = live & only_swept & !slow;
-        foreseen = foreseen | stops;
-        live = live & !stops;
-      }
+    const auto slow = live & (change * change > tolerance_squared * before);
+    if (!kMaxDissipation && foresee && k >= 2) {
+      const auto stops = live & only_swept & !slow;
+      foreseen = foreseen | stops;
+      live = live & !stops;
     }
     if (!any(live) || k >= cap) return foreseen;
-    if (!kMaxDissipation && k >= 2) {
-      if (any(slow)) {
-        const double alpha = k >= o.late ? o.alpha_late : k > 2 ? o.alpha_again : o.alpha;
-        newton_step<M>(p, slow, constant<S>(alpha));
-        ++info.newton_steps;
-      }
-      only_swept = !slow;
-    }
+    only_swept = live;
     before = change;
+    const bool late = k >= o.late;
+    if (kMaxDissipation || !(late || k % kEvery == 0) || !any(slow)) continue;
+    const double alpha = late ? o.alpha_late : k > kEvery ? o.alpha_again : o.alpha;
+    step_of<M>(p, slow, constant<S>(alpha));
+    ++info.newton_steps;
+    only_swept = !slow;
+    info.residual = certify<M, kMaxDissipation>(p);
+    info.certified = true;
+    live = live & !(slow & (info.residual <= enough));
+    if (!any(live)) return foreseen;
   }
 }
 
@@ -250,15 +267,17 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
   // The change of a sweep says little below what the residual has to reach.
   const S tolerance_squared =
       min(madd(relative * relative, fastest, absolute * absolute), allowed * allowed);
+  const S enough = constant<S>(o.enough) * allowed;
   // False for NaN, and where products of block entries would overflow.
   const auto finite = sum < constant<S>(sizeof(Value<S>) == 4 ? 1e14 : 1e30);
   const auto foreseen =
-      iterate<M, kMaxDissipation>(p, finite, tolerance_squared, o.foresee, o, info);
+      iterate<M, kMaxDissipation>(p, finite, tolerance_squared, enough, o.foresee, o, info);
   // Which of the lanes are not solved. The residuals of others stay: float would evaluate them anew
   // without double's help.
   S worst = zero;
   const auto unsolved = [&](Mask<S> lanes) {
-    worst = select(lanes, certify<M, kMaxDissipation>(p), worst);
+    worst = select(lanes, info.certified ? info.residual : certify<M, kMaxDissipation>(p), worst);
+    info.certified = false;
     auto bad = lanes & !(worst <= allowed);
     if (sizeof(Value<S>) == 4 && !kMaxDissipation && any(bad)) {
       worst = select(bad, certify_in_double<M>(p, bad), worst);
@@ -268,7 +287,7 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
   };
   auto bad = unsolved(finite);
   if (const auto again = bad & foreseen; any(again)) {
-    iterate<M, kMaxDissipation>(p, again, tolerance_squared, false, o, info);
+    iterate<M, kMaxDissipation>(p, again, tolerance_squared, enough, false, o, info);
     ++info.resumed;
     bad = (bad & !again) | unsolved(again);
   }

@@ -16,9 +16,9 @@
 // changes a bit of it (but the sign of a zero) against the problem of that lane alone, as long as
 // its own contacts and dofs come in the same order and its dofs lie in the same chains (`clear`).
 #pragma once
+#include "contact/bodies.h"
 #include "contact/coupling.h"
 #include "contact/residual.h"
-#include "lane/row3.h"
 
 // A stage of the solve: one copy of machine code. Inlining a stage into every caller costs minutes
 // of compilation and gains nothing, a call being a nanosecond.
@@ -26,39 +26,6 @@
 
 namespace stickslip::contact::inline STICKSLIP_KERNELS {
 
-/// Shared dofs handled by one operation.
-template <class S, bool kPlain = ScalarTraits<S>::kWidth == 1>
-struct ChunkOf {
-  using Type = S;
-  static constexpr int kSize = 1;
-};
-template <class S>
-struct ChunkOf<S, true> {
-  using Type = Pack<S, 4>;
-  static constexpr int kSize = 4;
-};
-template <class S>
-using Chunk = typename ChunkOf<S>::Type;
-template <class S>
-inline constexpr int kChunk = ChunkOf<S>::kSize;
-
-template <class S>
-STICKSLIP_INLINE Chunk<S> load_chunk(const S* p) {
-  Chunk<S> c;
-  __builtin_memcpy(&c, p, sizeof c);
-  return c;
-}
-template <class S>
-STICKSLIP_INLINE void store_chunk(S* p, const Chunk<S>& c) {
-  __builtin_memcpy(p, &c, sizeof c);
-}
-template <class S>
-STICKSLIP_INLINE Chunk<S> madd_chunk(const Chunk<S>& a, S b, const Chunk<S>& c) {
-  if constexpr (ScalarTraits<S>::kWidth == 1)
-    return madd(a, Chunk<S>(b), c);
-  else
-    return madd(a, b, c);
-}
 constexpr int round_up(int n, int k) { return (n + k - 1) / k * k; }
 
 /// A symmetric 3x3 matrix whose columns are needed: for a plain scalar one register each, for a
@@ -121,6 +88,9 @@ struct FactoredContact {
   Mask<S> active;        // false in lanes that do not have this contact
   int count;             // shared dofs it touches
   int* index;            // which ones, ascending
+  int body;              // that it shares with others; -1: none
+  bool single;           // in some lane no other contact is on its body
+  S arm[3];              // from that body's reference point [m]
   const bool* odd;       // of the problem's dofs: which of two chains sums it (add_rows)
   bool alternates;       // index[k] is in chain k & 1
   bool begins_with_six;  // alternates, first dofs 0 to 5 (a floating base)
@@ -140,6 +110,7 @@ struct FactoredContact {
   Chunk<S>* yt;      // (chunks, 3), zero where a chunk reaches past the touched dofs
   // Newton step.
   bool moves;            // it takes part
+  bool alone;            // with rows of its own in the matrix, in some lane
   Row3<S> n_columns[3];  // N, eliminated response of the contact
   S n_offset[3];
   Chunk<S>* yn;  // (3, chunks): columns of Y^T N
@@ -195,8 +166,9 @@ class FactoredProblem {
   void clear(int m, const bool* odd = nullptr) {
     n_ = 0;
     m_ = m;
+    num_bodies_ = 0;
     identity_ = true;
-    coupled_ = false;
+    coupled_ = Coupled::kNot;
     for (int k = 0; k < padded(m); ++k) w0[k] = constant<S>(0);
     odd_ = odd ? given_ : alternating_;
     for (int k = 0; odd && k < m; ++k) {
@@ -207,7 +179,9 @@ class FactoredProblem {
   /// Adds a contact that touches all shared dofs; its number. The caller sets what else it is.
   int append() {
     contacts_[n_].count = -1;
-    coupled_ = false;
+    contacts_[n_].body = -1;
+    contacts_[n_].single = true;
+    coupled_ = Coupled::kNot;
     return n_++;
   }
   /// The same, without private part, offset or warm start.
@@ -223,7 +197,7 @@ class FactoredProblem {
   /// The contact touches only these shared dofs (ascending); its rows are then y(i)[k] at dof
   /// index[k].
   void set_index(int i, const int* index, int count) {
-    coupled_ = false;
+    coupled_ = Coupled::kNot;
     contacts_[i].count = count;
     for (int k = 0; k < count; ++k) contacts_[i].index[k] = index[k];
     identity_ = false;
@@ -244,13 +218,39 @@ class FactoredProblem {
     for (int k = 0; k < 6 && c.begins_with_six; ++k) c.begins_with_six = c.index[k] == k;
   }
 
+  /// The contacts [first, end), whose `active` is set, are on one body, several of them in these
+  /// lanes. The caller sets their `arm`, and the columns of the body.
+  ContactBody<S>& add_body(int first, int end, Mask<S> several) {
+    for (int i = first; i < end; ++i) {
+      contacts_[i].body = num_bodies_;
+      contacts_[i].single = any(contacts_[i].active & !several);
+    }
+    ContactBody<S>& b = bodies_[num_bodies_++];
+    b.clear();
+    b.first = first, b.end = end, b.several = several;
+    coupled_ = Coupled::kNot;
+    return b;
+  }
+  int num_bodies() const { return num_bodies_; }
+  ContactBody<S>& body(int i) { return bodies_[i]; }
+
   /// Makes `coupling` that of the contacts, which are complete.
-  void find_coupling() {
-    if (coupled_) return;
+  void couple_contacts() {
+    if (coupled_ == Coupled::kContacts) return;
     coupling.begin(m_);
     for (int i = 0; i < n_; ++i) coupling.add(contacts_[i].index, contacts_[i].count);
     coupling.complete();
-    coupled_ = true;
+    coupled_ = Coupled::kContacts;
+  }
+  /// The same with bodies in place of their contacts.
+  void couple_bodies() {
+    if (coupled_ == Coupled::kBodies) return;
+    coupling.begin(m_);
+    for (int i = 0; i < n_; ++i)
+      if (contacts_[i].single) coupling.add(contacts_[i].index, contacts_[i].count);
+    for (int i = 0; i < num_bodies_; ++i) coupling.add(bodies_[i].left(), bodies_[i].left_count());
+    coupling.complete();
+    coupled_ = Coupled::kBodies;
   }
 
   Row3<S>* y(int i) { return contacts_[i].y; }
@@ -296,6 +296,11 @@ class FactoredProblem {
     alternating_ = arena.take<bool>(m);
     for (int k = 0; memory && k < m; ++k) alternating_[k] = k & 1;
     coupling.lay_out(arena, n, m);
+    bodies_ = arena.take<ContactBody<S>>(n / 2);
+    for (int i = 0; i < n / 2; ++i) {
+      ContactBody<S> unused;
+      (memory ? bodies_[i] : unused).lay_out(arena, m);
+    }
     for (int i = 0; i < n; ++i) {
       int* index = arena.take<int>(m);
       Row3<S>* y = arena.take<Row3<S>>(m);
@@ -321,13 +326,16 @@ class FactoredProblem {
   static constexpr bool kPlain = ScalarTraits<S>::kWidth == 1;
   static constexpr bool kIsDouble = kPlain && sizeof(S) == 8;
 
+  enum class Coupled { kNot, kContacts, kBodies };
+
   FactoredContact<S>* contacts_ = nullptr;
+  ContactBody<S>* bodies_ = nullptr;
   FactoredCapacity capacity_;
-  int n_ = 0, m_ = 0;
+  int n_ = 0, m_ = 0, num_bodies_ = 0;
   bool *given_ = nullptr, *alternating_ = nullptr;
   const bool* odd_ = nullptr;  // one of the two
   bool identity_ = true;
-  bool coupled_ = false;
+  Coupled coupled_ = Coupled::kNot;
 };
 
 /// The first six terms of `add_rows`, where they are dofs 0 to 5.

@@ -105,7 +105,8 @@ class Fallback {
     return sqrt(sum);
   }
   void newton_direction(double alpha) {
-    eliminate_contacts<M>(p_, true, alpha, center());
+    eliminate_contacts<M>(p_, true, alpha, center(),
+                          [&](FactoredContact<double>& c) { bring_contact<M>(p_, c); });
     const double* x = solve_shared<M>(p_);
     for (int i = 0; i < p_.size(); ++i) {
       const FactoredContact<double>& c = p_.contact(i);

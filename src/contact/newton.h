@@ -3,9 +3,10 @@
 //
 // Per contact, in velocity units (scale = trace G_ii / 3), u its velocity, t = scale lambda_T -
 // u_T, s = scale lambda_z - u_z:
-//   F_z = u_z,  F_T = u_T (stick, |t| <= mu s)  or  scale lambda_T - mu s e, e = t / |t| (slip);
-//   lambda = 0 where s <= 0 A dlambda + B du = -F,   du = (P + alpha scale I) dlambda + Y dw   =>
-//   dlambda = -(g + N Y dw)
+//   F_z = u_z,  F_T = u_T (stick, |t| <= mu s)  or  scale lambda_T - mu s e, e = t / |t| (slip)
+//   lambda = 0 where s <= 0
+//   A dlambda + B du = -F,   du = (P + alpha scale I) dlambda + Y dw
+//   =>  dlambda = -(g + N Y dw)
 // With dw = sum Y^T dlambda this leaves (I + sum Y^T N Y) dw = -sum Y^T g: one m x m elimination
 // instead of 3n x 3n.
 #pragma once
@@ -25,6 +26,9 @@ struct NewtonBlock {
   T n[9];  // out: N, row-major
   T g[3];  // out
 };
+
+/// A step above this, or not finite, is not taken.
+inline constexpr double kHugeStep = 1e6;
 
 /// Lanes where the contact is not both open and without an impulse; NaN counts.
 template <class S>
@@ -97,13 +101,13 @@ STICKSLIP_INLINE void eliminate(NewtonBlock<T>& b, T alpha, Mask<T> live) {
   }
 }
 
-/// Columns of Y^T N of one contact over its shared dofs, by chunks.
+/// Columns of Y^T N of one contact over its shared dofs, by chunks; n: the columns of N.
 template <int M, class S>
-STICKSLIP_INLINE void respond(FactoredContact<S>& c) {
+STICKSLIP_INLINE void respond(FactoredContact<S>& c, const Row3<S> columns[3]) {
   const int chunks = chunk_count<M>(c);
   for (int r = 0; r < 3; ++r) {
     S n[3];
-    store(c.n_columns[r], n);
+    store(columns[r], n);
     for (int j = 0; j < chunks; ++j) {
       Chunk<S> x = row_chunk<M>(c, 0, j) * Chunk<S>(n[0]);
       x = madd_chunk<S>(row_chunk<M>(c, 1, j), n[1], x);
@@ -112,13 +116,22 @@ STICKSLIP_INLINE void respond(FactoredContact<S>& c) {
   }
 }
 
-/// Elimination of all contacts, Y^T N, and -sum Y^T g into p.scratch. Four contacts at a time for a
-/// plain scalar: each contact's numbers are the same either way. `center`: proximal center (n, 3),
-/// or null where it is the present impulse. A contact that is open without an impulse in every
-/// live lane brings nothing, and is left out of a pack's step.
+/// Brings one contact into the matrix and the right-hand side -sum Y^T g, in p.scratch.
 template <int M, class S>
+STICKSLIP_INLINE void bring_contact(FactoredProblem<S>& p, FactoredContact<S>& c) {
+  respond<M>(c, c.n_columns);
+  const S minus[3] = {-c.n_offset[0], -c.n_offset[1], -c.n_offset[2]};
+  add_transposed<M>(c, minus, p.scratch);
+}
+
+/// Elimination of all contacts that move, each then handed to bring(contact), into a right-hand
+/// side that starts at zero. Four contacts at a time for a plain scalar: each contact's numbers are
+/// the same either way. `center`: proximal center (n, 3), or null where it is the present impulse.
+/// A contact that is open without an impulse in every live lane brings nothing, and is left out of
+/// a pack's step.
+template <int M, class S, class Bring>
 STICKSLIP_STAGE void eliminate_contacts(FactoredProblem<S>& p, Mask<S> live, S alpha,
-                                        const S* center) {
+                                        const S* center, const Bring& bring) {
   constexpr bool kPlain = ScalarTraits<S>::kWidth == 1;
   constexpr int kLanes = kPlain ? 4 : 1;
   using T = Chunk<S>;
@@ -130,7 +143,7 @@ STICKSLIP_STAGE void eliminate_contacts(FactoredProblem<S>& p, Mask<S> live, S a
     for (int l = 0; l < kLanes; ++l) {
       const int i = first + l < n ? first + l : first;  // the last pack is filled with copies
       FactoredContact<S>& c = p.contact(i);
-      c.moves = kPlain || any(live & c.active);
+      c.moves = c.alone = kPlain || any(live & c.active);
       if (!c.moves) continue;
       S v[3], lambda[3];
       contact_velocity<M>(c, p.w, v);
@@ -138,7 +151,7 @@ STICKSLIP_STAGE void eliminate_contacts(FactoredProblem<S>& p, Mask<S> live, S a
       if (center)
         for (int r = 0; r < 3; ++r)
           v[r] = madd(alpha * c.local.scale, lambda[r] - center[3 * i + r], v[r]);
-      c.moves = kPlain || any(live & may_move(c.local.scale, lambda, v[2]));
+      c.moves = c.alone = kPlain || any(live & may_move(c.local.scale, lambda, v[2]));
       S* out = reinterpret_cast<S*>(&b) + l;
       for (int r = 0; r < 6; ++r) out[r * kLanes] = c.private_block[r];
       out[6 * kLanes] = c.local.mu;
@@ -156,25 +169,17 @@ STICKSLIP_STAGE void eliminate_contacts(FactoredProblem<S>& p, Mask<S> live, S a
       const auto at = [out](int r) { return out[r * kLanes]; };
       for (int j = 0; j < 3; ++j) c.n_columns[j] = make_row3(at(14 + j), at(17 + j), at(20 + j));
       for (int r = 0; r < 3; ++r) c.n_offset[r] = at(23 + r);
-      respond<M>(c);
-      const S minus[3] = {-c.n_offset[0], -c.n_offset[1], -c.n_offset[2]};
-      add_transposed<M>(c, minus, rhs);
+      bring(c);
     }
   }
 }
 
-/// One guarded Newton step on the lanes `live`: impulses return to the cone (normal kept), w
-/// follows. A lane whose step is not finite or above 1e6 keeps its impulses: float lanes do meet a
-/// broken pivot.
-template <int M, class S>
-STICKSLIP_STAGE void newton_step(FactoredProblem<S>& p, Mask<S> live, S alpha) {
-  const S zero = constant<S>(0), one = constant<S>(1), huge = constant<S>(1e6);
-  eliminate_contacts<M>(p, live, alpha, static_cast<const S*>(nullptr));
-  const S* x = solve_shared<M>(p);
-  S size = zero;
-  for (int k = 0; k < (M ? M : p.dofs()); ++k) size = size + abs(x[k]);
-  const auto sane = live & (size < huge);
-  const Row3<S> none = make_row3(zero, zero, zero);
+/// Takes a Newton step in the lanes `sane`: each contact's impulse answers to the change(contact,
+/// out) of its velocity, returns to the cone (normal kept), and w follows. A lane whose step is not
+/// finite or above 1e6 keeps its impulses: float lanes do meet a broken pivot.
+template <int M, class S, class Change>
+STICKSLIP_INLINE void take_newton_step(FactoredProblem<S>& p, Mask<S> sane, const Change& change) {
+  const S zero = constant<S>(0), one = constant<S>(1), huge = constant<S>(kHugeStep);
   for (int i = 0; i < p.size(); ++i) {
     FactoredContact<S>& c = p.contact(i);
     if (!c.moves) {
@@ -182,7 +187,7 @@ STICKSLIP_STAGE void newton_step(FactoredProblem<S>& p, Mask<S> live, S alpha) {
       continue;
     }
     S dv[3], response[3], old[3], l[3];
-    store(add_rows<M>(c, x, none), dv);
+    change(c, dv);
     store(madd(c.n_columns[2], dv[2], madd(c.n_columns[1], dv[1], c.n_columns[0] * dv[0])),
           response);
     store(c.lambda, old);
@@ -206,6 +211,26 @@ STICKSLIP_STAGE void newton_step(FactoredProblem<S>& p, Mask<S> live, S alpha) {
     set_impulse(c, l);
     add_transposed<M>(c, d, p.w);
   }
+}
+
+/// What the rows of a contact make of a change x of w.
+template <int M, class S>
+STICKSLIP_INLINE void change_of(const FactoredContact<S>& c, const S* x, S dv[3]) {
+  const S zero = constant<S>(0);
+  store(add_rows<M>(c, x, make_row3(zero, zero, zero)), dv);
+}
+
+/// One guarded Newton step on the lanes `live`.
+template <int M, class S>
+STICKSLIP_STAGE void newton_step(FactoredProblem<S>& p, Mask<S> live, S alpha) {
+  eliminate_contacts<M>(p, live, alpha, static_cast<const S*>(nullptr),
+                        [&](FactoredContact<S>& c) STICKSLIP_LAMBDA { bring_contact<M>(p, c); });
+  const S* x = solve_shared<M>(p);
+  S size = constant<S>(0);
+  for (int k = 0; k < (M ? M : p.dofs()); ++k) size = size + abs(x[k]);
+  take_newton_step<M>(p, live & (size < constant<S>(kHugeStep)),
+                      [&](const FactoredContact<S>& c, S dv[3])
+                          STICKSLIP_LAMBDA { change_of<M>(c, x, dv); });
 }
 
 }  // namespace stickslip::contact::inline STICKSLIP_KERNELS

@@ -117,11 +117,18 @@ inline constexpr int kTileColumns = 6;
 inline constexpr int kTileColumns = 3;
 #endif
 
-/// Adds Y^T N Y of the contacts [first, end), which touch the same dofs, to R rows and C columns of
-/// the matrix: those of the dofs from the `row`-th and the `column`-th that they touch.
-template <int R, int C, class S>
-STICKSLIP_INLINE void add_tile(FactoredProblem<S>& p, int first, int end, int row, int column) {
-  const int *index = p.contact(first).index, count = p.contact(first).count;
+/// What a contact (three rows) or a body (six) brings to the matrix, over the dofs that it touches.
+template <class S>
+struct MatrixShare {
+  const S* y;   // (dofs, rows)
+  const S* yn;  // (rows, dofs): Y^T N
+};
+
+/// Adds Y^T N Y of n shares with the same `count` dofs to R rows and C columns of the matrix: those
+/// of the dofs from the `row`-th and the `column`-th.
+template <int kRows, int R, int C, class S, class ShareOf>
+STICKSLIP_INLINE void add_tile(FactoredProblem<S>& p, const int* index, int count, int row,
+                               int column, int n, const ShareOf& share_of) {
   S sum[R][C];
   const auto at = [&](int a, int b) STICKSLIP_LAMBDA {
     return p.matrix + index[row + a] * p.stride() + index[column + b];
@@ -130,23 +137,33 @@ STICKSLIP_INLINE void add_tile(FactoredProblem<S>& p, int first, int end, int ro
   for (int a = 0; a < R; ++a)
 #pragma GCC unroll 6
     for (int b = 0; b < C; ++b) sum[a][b] = *at(a, b);
-  for (int i = first; i < end; ++i) {
-    const FactoredContact<S>& c = p.contact(i);
-    if (!c.moves) continue;
-#pragma GCC unroll 3
-    for (int r = 0; r < 3; ++r) {
-      const S* t = c.yn + r * count + row;
+  for (int i = 0; i < n; ++i) {
+    const MatrixShare<S> share = share_of(i);
+    if (!share.y) continue;
+#pragma GCC unroll 6
+    for (int r = 0; r < kRows; ++r) {
+      const S *t = share.yn + r * count + row, *y = share.y + kRows * column + r;
 #pragma GCC unroll 3
       for (int a = 0; a < R; ++a)
 #pragma GCC unroll 6
-        for (int b = 0; b < C; ++b)
-          sum[a][b] = madd(row_chunk<0>(c, r, column + b), t[a], sum[a][b]);
+        for (int b = 0; b < C; ++b) sum[a][b] = madd(y[kRows * b], t[a], sum[a][b]);
     }
   }
 #pragma GCC unroll 3
   for (int a = 0; a < R; ++a)
 #pragma GCC unroll 6
     for (int b = 0; b < C; ++b) *at(a, b) = sum[a][b];
+}
+
+template <int kRows, class S, class ShareOf>
+STICKSLIP_INLINE void add_shares(FactoredProblem<S>& p, const int* index, int count, int n,
+                                 const ShareOf& share_of) {
+  in_runs<kTileRows>(count, [&](int row, auto rows) STICKSLIP_LAMBDA {
+    in_runs<kTileColumns>(count, [&](int column, auto columns) STICKSLIP_LAMBDA {
+      add_tile<kRows, decltype(rows)::value, decltype(columns)::value>(p, index, count, row, column,
+                                                                       n, share_of);
+    });
+  });
 }
 
 template <class S>
@@ -162,6 +179,7 @@ STICKSLIP_STAGE void sum_matrix(FactoredProblem<S>& p) {
   const S zero = constant<S>(0);
   const int stride = p.stride();
   for (int j = 0; j < p.dofs(); ++j) {
+    if (!p.coupling.touched(j)) continue;
     for (int k = 0; k < p.coupling.count(j); ++k) {
       const int i = p.coupling.list(j)[k];
       p.matrix[i * stride + j] = p.matrix[j * stride + i] = zero;
@@ -169,17 +187,26 @@ STICKSLIP_STAGE void sum_matrix(FactoredProblem<S>& p) {
     p.matrix[j * stride + j] = constant<S>(1);
   }
   for (int first = 0, end; first < p.size(); first = end) {
-    bool moves = p.contact(first).moves;
-    for (end = first + 1; end < p.size(); ++end) {
-      if (!touch_the_same(p.contact(first), p.contact(end))) break;
-      moves = moves || p.contact(end).moves;
-    }
-    if (!moves) continue;
-    const int count = p.contact(first).count;
-    in_runs<kTileRows>(count, [&](int row, auto rows) STICKSLIP_LAMBDA {
-      in_runs<kTileColumns>(count, [&](int column, auto columns) STICKSLIP_LAMBDA {
-        add_tile<decltype(rows)::value, decltype(columns)::value>(p, first, end, row, column);
-      });
+    end = first + 1;
+    if (!p.contact(first).alone) continue;
+    while (end < p.size() && touch_the_same(p.contact(first), p.contact(end))) ++end;
+    const auto share_of = [&](int i) STICKSLIP_LAMBDA -> MatrixShare<S> {
+      const FactoredContact<S>& c = p.contact(first + i);
+      return {c.alone ? reinterpret_cast<const S*>(c.y) : nullptr, c.yn};
+    };
+    const FactoredContact<S>& c = p.contact(first);
+    add_shares<3>(p, c.index, c.count, end - first, share_of);
+  }
+}
+
+/// The same of the bodies.
+template <class S>
+STICKSLIP_STAGE void add_bodies(FactoredProblem<S>& p) {
+  for (int i = 0; i < p.num_bodies(); ++i) {
+    const ContactBody<S>& b = p.body(i);
+    if (!b.moves) continue;
+    add_shares<6>(p, b.left(), b.left_count(), 1, [&](int) STICKSLIP_LAMBDA -> MatrixShare<S> {
+      return {b.left_columns(), b.response_rows};
     });
   }
 }
@@ -250,41 +277,54 @@ STICKSLIP_INLINE void eliminate_three(FactoredProblem<S>& p, int j) {
 template <class S>
 STICKSLIP_STAGE void eliminate_dofs(FactoredProblem<S>& p) {
   for (int j = p.dofs() - 1; j >= 0;) {
-    if (p.coupling.three(j)) {
+    const bool three = p.coupling.three(j);
+    if (three)
       eliminate_three(p, j);
-      j -= 3;
-    } else {
+    else if (p.coupling.touched(j))
       eliminate_one(p, j);
-      j -= 1;
-    }
+    j -= three ? 3 : 1;
   }
 }
 
 // ---- any number of dofs, a plain scalar
 
+/// Adds Y^T N Y of a contact (three rows) or a body (six): y (chunks, rows), yn (rows, chunks).
+template <int kRows, class S>
+STICKSLIP_INLINE void add_share_by_chunks(FactoredProblem<S>& p, const int* index, int count,
+                                          const int* start, int chunks, const Chunk<S>* y,
+                                          const Chunk<S>* yn) {
+  for (int j = 0, k = 0; j < chunks; ++j)
+    for (; k < count && index[k] < start[j] + kChunk<S>; ++k) {
+      S t[kRows];
+      for (int r = 0; r < kRows; ++r)
+        t[r] = reinterpret_cast<const S*>(yn + r * chunks + j)[index[k] - start[j]];
+      S* row = p.matrix + index[k] * p.stride();
+      for (int q = 0; q < chunks; ++q) {
+        Chunk<S> v = load_chunk(row + start[q]);
+        for (int r = 0; r < kRows; ++r) v = madd_chunk<S>(y[kRows * q + r], t[r], v);
+        store_chunk(row + start[q], v);
+      }
+    }
+}
+
 template <class S>
 STICKSLIP_STAGE void sum_matrix_by_chunks(FactoredProblem<S>& p) {
-  constexpr int K = kChunk<S>;
   const int m = p.dofs(), stride = p.stride();
   S* h = p.matrix;
   for (int k = 0; k < m * stride; ++k) h[k] = constant<S>(0);
   for (int j = 0; j < m; ++j) h[j * stride + j] = constant<S>(1);
   for (int i = 0; i < p.size(); ++i) {
     const FactoredContact<S>& c = p.contact(i);
-    const int chunks = chunk_count<0>(c);
-    for (int j = 0, k = 0; j < chunks; ++j)
-      for (; k < c.count && c.index[k] < first_dof<0>(c, j) + K; ++k) {
-        const int lane = c.index[k] - first_dof<0>(c, j);
-        S t[3];
-        for (int r = 0; r < 3; ++r) t[r] = reinterpret_cast<const S*>(c.yn + r * chunks + j)[lane];
-        S* row = h + c.index[k] * stride;
-        for (int q = 0; q < chunks; ++q) {
-          S* to = row + first_dof<0>(c, q);
-          Chunk<S> v = load_chunk(to);
-          for (int r = 0; r < 3; ++r) v = madd_chunk<S>(row_chunk<0>(c, r, q), t[r], v);
-          store_chunk(to, v);
-        }
-      }
+    if (c.alone) add_share_by_chunks<3>(p, c.index, c.count, c.chunk_start, c.chunks, c.yt, c.yn);
+  }
+}
+
+template <class S>
+STICKSLIP_STAGE void add_bodies_by_chunks(FactoredProblem<S>& p) {
+  for (int i = 0; i < p.num_bodies(); ++i) {
+    const ContactBody<S>& b = p.body(i);
+    add_share_by_chunks<6>(p, b.left(), b.left_count(), b.chunk_start(), b.chunks(),
+                           b.left_columns(), b.response_rows);
   }
 }
 
@@ -294,6 +334,7 @@ STICKSLIP_STAGE void eliminate_dofs_by_chunks(FactoredProblem<S>& p) {
   const int stride = p.stride();
   S *h = p.matrix, *x = p.scratch;
   for (int j = p.dofs() - 1; j >= 0; --j) {
+    if (!p.coupling.touched(j)) continue;
     S* pivot = h + j * stride;
     pivot[j] = inverse_pivot(pivot[j]);
     for (int k = 0; k < p.coupling.count(j); ++k) {
@@ -315,6 +356,7 @@ template <class S>
 STICKSLIP_STAGE void substitute(FactoredProblem<S>& p) {
   S* x = p.scratch;
   for (int j = 0; j < p.dofs(); ++j) {
+    if (!p.coupling.touched(j)) continue;
     const S* row = p.matrix + j * p.stride();
     const int* list = p.coupling.list(j);
     S y = x[j];
@@ -323,14 +365,17 @@ STICKSLIP_STAGE void substitute(FactoredProblem<S>& p) {
   }
 }
 
+/// `by_bodies`: the contacts that are not `alone` are there as their bodies.
 template <class S>
-S* solve_any(FactoredProblem<S>& p) {
-  p.find_coupling();
+S* solve_any(FactoredProblem<S>& p, bool by_bodies = false) {
+  by_bodies ? p.couple_bodies() : p.couple_contacts();
   if constexpr (ScalarTraits<S>::kWidth == 1) {
     sum_matrix_by_chunks(p);
+    if (by_bodies) add_bodies_by_chunks(p);
     eliminate_dofs_by_chunks(p);
   } else {
     sum_matrix(p);
+    if (by_bodies) add_bodies(p);
     eliminate_dofs(p);
   }
   substitute(p);

@@ -65,7 +65,22 @@ STICKSLIP_INLINE Row3<S> pass_first_joint(const LinkState<Wide<S>>& joint, int l
   }
 }
 
-/// `point` relative to the base origin; contact axes along the world's.
+/// Takes test forces from `link` to the base.
+template <class S>
+STICKSLIP_INLINE void climb(const Tree<S>& t, LinkIndex link, TestForces<S>& f,
+                            ContactRows<S>& rows) {
+  for (; link.slot != kBaseSlot; link = t.slots[link.slot].parent[link.lane]) {
+    rows.path[rows.depth] = link;
+    store(pass_joint<S>(t.links[link.slot], link.lane, f), rows.joint[rows.depth++]);
+  }
+  Row3<S> base[6] = {f.lin[0], f.lin[1], f.lin[2], f.ang[0], f.ang[1], f.ang[2]};
+  if (t.floating) solve_base_transposed(t.base, base);
+#pragma GCC unroll 6
+  for (int k = 0; k < 6; ++k) store(base[k], rows.base[k]);
+}
+
+/// Rows of the velocity of a point: unit forces there. `point` relative to the base origin; contact
+/// axes along the world's.
 template <class S>
 void compute_contact_rows(const Tree<S>& t, LinkIndex link, const Vec3<S>& point,
                           ContactRows<S>& rows) {
@@ -74,17 +89,34 @@ void compute_contact_rows(const Tree<S>& t, LinkIndex link, const Vec3<S>& point
                       make_row3(-point.y, point.x, o)},
                      {make_row3(one, o, o), make_row3(o, one, o), make_row3(o, o, one)}};
   rows.depth = 0;
-  const auto put = [&](const Row3<S>& z) STICKSLIP_LAMBDA {
+  if (link.slot != kBaseSlot) {
     rows.path[rows.depth] = link;
-    store(z, rows.joint[rows.depth++]);
+    store(pass_first_joint(t.links[link.slot], link.lane, point, f), rows.joint[rows.depth++]);
     link = t.slots[link.slot].parent[link.lane];
-  };
-  if (link.slot != kBaseSlot) put(pass_first_joint(t.links[link.slot], link.lane, point, f));
-  while (link.slot != kBaseSlot) put(pass_joint<S>(t.links[link.slot], link.lane, f));
-  Row3<S> base[6] = {f.lin[0], f.lin[1], f.lin[2], f.ang[0], f.ang[1], f.ang[2]};
-  if (t.floating) solve_base_transposed(t.base, base);
-#pragma GCC unroll 6
-  for (int k = 0; k < 6; ++k) store(base[k], rows.base[k]);
+  }
+  climb(t, link, f, rows);
+}
+
+/// Rows of the angular velocity of a link: unit moments along the world's axes.
+template <class S>
+void compute_angular_rows(const Tree<S>& t, LinkIndex link, ContactRows<S>& rows) {
+  const S o = constant<S>(0), one = constant<S>(1);
+  const Row3<S> none = make_row3(o, o, o);
+  TestForces<S> f = {{make_row3(one, o, o), make_row3(o, one, o), make_row3(o, o, one)},
+                     {none, none, none}};
+  rows.depth = 0;
+  climb(t, link, f, rows);
+}
+
+/// Column of the velocity of a point at `arm` from the one that `linear` is of, on the same link.
+template <class S>
+STICKSLIP_INLINE Row3<S> at_point(const Row3<S>& linear, const Row3<S>& angular,
+                                  const Vec3<S>& arm) {
+  S v[3], w[3];
+  store(linear, v);
+  store(angular, w);
+  const Vec3<S> at = cross(Vec3<S>{w[0], w[1], w[2]}, arm, Vec3<S>{v[0], v[1], v[2]});
+  return make_row3(at.x, at.y, at.z);
 }
 
 /// One row Y = J L^-1: the unit force `axis` at `point`. Calls put_joint(link, entry) for the

@@ -71,4 +71,19 @@ STICKSLIP_INLINE Row3<S> nmadd(const Row3<S>& a, S b, const Row3<S>& c) {  // c 
     return {nmadd(a.x, b, c.x), nmadd(a.y, b, c.y), nmadd(a.z, b, c.z)};
 }
 
+/// a in the lanes of the mask, b elsewhere.
+template <class S>
+STICKSLIP_INLINE Row3<S> select(Mask<S> m, const Row3<S>& a, const Row3<S>& b) {
+  S x[3], y[3];
+  store(a, x);
+  store(b, y);
+  return make_row3(select(m, x[0], y[0]), select(m, x[1], y[1]), select(m, x[2], y[2]));
+}
+/// a in the lanes of the mask; zero elsewhere.
+template <class S>
+STICKSLIP_INLINE Row3<S> row_where(Mask<S> m, const Row3<S>& a) {
+  const S zero = constant<S>(0);
+  return select(m, a, make_row3(zero, zero, zero));
+}
+
 }  // namespace stickslip::inline STICKSLIP_KERNELS

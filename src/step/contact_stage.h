@@ -25,6 +25,16 @@ struct ActiveContact {
   dynamics::ContactRows<S> rows;
 };
 
+/// A link, not body 0, that takes part with several points.
+template <class S>
+struct TouchingLink {
+  dynamics::LinkIndex link;
+  int first, end;                            // its contacts
+  Mask<S> several;                           // lanes that have two or more of them
+  Vec3<S> origin;                            // of the link, relative to the base origin
+  dynamics::ContactRows<S> linear, angular;  // of its velocity at the origin
+};
+
 template <class S>
 struct LaneInfo;
 
@@ -107,13 +117,16 @@ class ContactStage {
   /// Takes the points lower than `reach` above the ground.
   void detect_within(const dynamics::Tree<S>& tree, S clearance, S reach, Mask<S> live);
   S fastest_shape(const dynamics::Tree<S>& tree, const Vec3<S>& base_velocity) const;
-  void compute_rows(dynamics::Tree<S>& tree);
+  void compute_rows(const dynamics::Tree<S>& tree);
+  /// The link of the contacts [first, end), if a lane has several of them; else null.
+  const TouchingLink<S>* add_link(const dynamics::Tree<S>& tree, int first, int end);
   /// Whether no two of the points in the list can have a joint in common.
   bool apart() const;
   /// The first contact after i that is on another body.
   int next_link(int i) const;
   void find_shared_joints();
   void number_shared_dofs(const dynamics::Tree<S>& tree);
+  void add_body(const TouchingLink<S>& link);
   void fill_contact(const dynamics::Tree<S>& tree, const ActiveContact<S>& a, const S* friction,
                     bool with_x);
   HostSolver::Effort ask_host(const HostSolver& host, contact::FactoredProblem<double>& p,
@@ -125,9 +138,12 @@ class ContactStage {
   const RobotTables* tables_;
   ActiveContact<S>* active_;
   int count_ = 0;
+  TouchingLink<S>* touching_;
+  int num_touching_ = 0;
   // Joints above active contacts, per slot and lane of a bundle; unset where there are no shared
   // dofs.
   Mask<S>*once_, *shared_;  // lanes where one contact, two or more of them are below
+  Mask<S>* common_;         // lanes where contacts of two or more bodies are below
   int* dof_;                // see shared_dof
   dynamics::LinkIndex* link_of_dof_;
   int num_shared_ = 0;

@@ -12,15 +12,25 @@ void ContactStage<S>::lay_out(contact::Arena& arena, const RobotTables& tables) 
   active_ = arena.take<ActiveContact<S>>(points);
   once_ = arena.take<Mask<S>>(links());
   shared_ = arena.take<Mask<S>>(links());
+  common_ = arena.take<Mask<S>>(links());
   dof_ = arena.take<int>(links());
   link_of_dof_ = arena.take<dynamics::LinkIndex>(tables.num_joints);
   index_ = arena.take<int>(dofs);
   odd_ = arena.take<bool>(dofs);
   for (int k = 0; odd_ && k < 6; ++k) odd_[k] = k & 1;
-  for (int i = 0; i < points; ++i) {
+  const auto lay_out_rows = [&](dynamics::ContactRows<S>* rows) {
     auto* path = arena.take<dynamics::LinkIndex>(tables.max_depth);
     auto* joint = arena.take<Row3<S>>(tables.max_depth);
-    if (active_) active_[i].rows.path = path, active_[i].rows.joint = joint;
+    if (rows) rows->path = path, rows->joint = joint;
+  };
+  for (int i = 0; i < points; ++i) lay_out_rows(active_ ? &active_[i].rows : nullptr);
+  touching_ = arena.take<TouchingLink<S>>(points / 2);
+  for (int i = 0; i < points / 2; ++i) {
+    for (auto rows : {&TouchingLink<S>::linear, &TouchingLink<S>::angular}) {
+      lay_out_rows(touching_ ? &(touching_[i].*rows) : nullptr);
+      auto* base = arena.take<Row3<S>>(6);
+      if (touching_) (touching_[i].*rows).base = base;
+    }
   }
   const contact::FactoredCapacity capacity{points > 0 ? points : 1, dofs};
   char* block = arena.take<char>(contact::FactoredProblem<S>::required_bytes(capacity));
@@ -165,11 +175,54 @@ void ContactStage<S>::add_restitution(S fall, S h) {
 // ---- the factored problem
 
 template <class S>
-void ContactStage<S>::compute_rows(dynamics::Tree<S>& tree) {
-  for (int i = 0; i < count_; ++i) {
-    ActiveContact<S>& a = active_[i];
-    a.rows.base = problem_.y(i);  // where the problem wants them
-    dynamics::compute_contact_rows(tree, tables_->shapes[a.shape].link, a.position, a.rows);
+const TouchingLink<S>* ContactStage<S>::add_link(const dynamics::Tree<S>& tree, int first,
+                                                 int end) {
+  TouchingLink<S>& t = touching_[num_touching_];
+  t.link = tables_->shapes[active_[first].shape].link;
+  if (end - first < 2 || t.link.slot == dynamics::kBaseSlot) return nullptr;
+  Mask<S> once = none<S>();
+  t.several = none<S>();
+  for (int i = first; i < end; ++i) {
+    t.several = t.several | (once & active_[i].active);
+    once = once | active_[i].active;
+  }
+  if (!any(t.several)) return nullptr;
+  ++num_touching_;
+  t.first = first, t.end = end;
+  t.origin =
+      dynamics::field_of<S, Vec3>(tree, t.link, &dynamics::LinkState<dynamics::Wide<S>>::position);
+  dynamics::compute_contact_rows(tree, t.link, t.origin, t.linear);
+  dynamics::compute_angular_rows(tree, t.link, t.angular);
+  return &t;
+}
+
+/// In lanes where a link has several contacts, their rows are made from those of the link.
+template <class S>
+void ContactStage<S>::compute_rows(const dynamics::Tree<S>& tree) {
+  num_touching_ = 0;
+  for (int first = 0, end; first < count_; first = end) {
+    end = next_link(first);
+    const TouchingLink<S>* t = add_link(tree, first, end);
+    for (int i = first; i < end; ++i) {
+      ActiveContact<S>& a = active_[i];
+      a.rows.base = problem_.y(i);  // where the problem wants them
+      const bool single = !t || any(a.active & !t->several);
+      if (single)
+        dynamics::compute_contact_rows(tree, tables_->shapes[a.shape].link, a.position, a.rows);
+      if (!t) continue;
+      const Vec3<S> arm = a.position - t->origin;
+      const auto put = [&](const Row3<S>& linear, const Row3<S>& angular, Row3<S>& to)
+                           STICKSLIP_LAMBDA {
+                             const Row3<S> row = dynamics::at_point(linear, angular, arm);
+                             store(single ? select(t->several, row, to) : row, to);
+                           };
+      a.rows.depth = t->linear.depth;
+      for (int k = 0; k < a.rows.depth; ++k) {
+        a.rows.path[k] = t->linear.path[k];
+        put(t->linear.joint[k], t->angular.joint[k], a.rows.joint[k]);
+      }
+      for (int k = 0; k < 6; ++k) put(t->linear.base[k], t->angular.base[k], a.rows.base[k]);
+    }
   }
 }
 
@@ -190,7 +243,7 @@ int ContactStage<S>::next_link(int i) const {
 
 template <class S>
 void ContactStage<S>::find_shared_joints() {
-  for (int k = 0; k < links(); ++k) once_[k] = shared_[k] = none<S>(), dof_[k] = -1;
+  for (int k = 0; k < links(); ++k) once_[k] = shared_[k] = common_[k] = none<S>(), dof_[k] = -1;
   for (int first = 0, end; first < count_; first = end) {
     end = next_link(first);
     Mask<S> once = none<S>(), twice = none<S>();
@@ -201,7 +254,8 @@ void ContactStage<S>::find_shared_joints() {
     const dynamics::ContactRows<S>& rows = active_[first].rows;
     for (int k = 0; k < rows.depth; ++k) {
       const int j = flat(rows.path[k]);
-      shared_[j] = shared_[j] | twice | (once_[j] & once);
+      common_[j] = common_[j] | (once_[j] & once);
+      shared_[j] = shared_[j] | twice | common_[j];
       once_[j] = once_[j] | once;
     }
   }
@@ -248,15 +302,42 @@ void ContactStage<S>::build_problem(dynamics::Tree<S>& tree, const S* friction, 
     }
   }
   for (int i = 0; i < count_; ++i) fill_contact(tree, active_[i], friction, with_x);
+  for (int i = 0; i < num_touching_; ++i) add_body(touching_[i]);
 }
 
-/// A row of the lanes in the mask; zero elsewhere.
+/// A joint is the link's own in lanes where no contact of another body is below it.
 template <class S>
-STICKSLIP_INLINE Row3<S> row_where(Mask<S> m, const Row3<S>& row) {
-  S v[3];
-  store(row, v);
-  const S zero = constant<S>(0);
-  return make_row3(select(m, v[0], zero), select(m, v[1], zero), select(m, v[2], zero));
+void ContactStage<S>::add_body(const TouchingLink<S>& t) {
+  contact::ContactBody<S>& body = problem_.add_body(t.first, t.end, t.several);
+  for (int i = t.first; i < t.end; ++i) {
+    const Vec3<S> arm = active_[i].position - t.origin;
+    S* to = problem_.contact(i).arm;
+    to[0] = arm.x, to[1] = arm.y, to[2] = arm.z;
+  }
+  S column[6];
+  const auto set_column = [&](Mask<S> lanes, const Row3<S>& linear, const Row3<S>& angular)
+                              STICKSLIP_LAMBDA {
+                                store(row_where(lanes, linear), column);
+                                store(row_where(lanes, angular), column + 3);
+                              };
+  for (int k = 0; k < (tables_->floating ? 6 : 0); ++k) {
+    set_column(t.several, t.linear.base[k], t.angular.base[k]);
+    body.add_left(k, column);
+  }
+  for (int k = t.linear.depth - 1; k >= 0; --k) {
+    const dynamics::LinkIndex joint = t.linear.path[k];
+    const int dof = shared_dof(joint);
+    if (dof < 0) continue;
+    const Mask<S> common = t.several & common_[flat(joint)], own = t.several & !common;
+    if (any(own)) {
+      set_column(own, t.linear.joint[k], t.angular.joint[k]);
+      body.add_own(column);
+    }
+    if (any(common)) {
+      set_column(common, t.linear.joint[k], t.angular.joint[k]);
+      body.add_left(dof, column);
+    }
+  }
 }
 
 template <class S>

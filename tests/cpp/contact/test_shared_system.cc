@@ -114,9 +114,9 @@ void build(FactoredProblem<S>& p, int m, const std::vector<std::vector<Part>>& l
       c.n_columns[s] = make_row3(column[0], column[1], column[2]);
       c.n_offset[s] = gather([&](const Part& x) { return x.g[s]; });
     }
-    c.moves = false;
-    for (const auto& lane : lanes) c.moves = c.moves || lane[k].moves;
-    if (ScalarTraits<S>::kWidth == 1) c.moves = true;  // a plain scalar leaves out none
+    c.moves = c.alone = false;
+    for (const auto& lane : lanes) c.moves = c.alone = c.moves || lane[k].moves;
+    if (ScalarTraits<S>::kWidth == 1) c.moves = c.alone = true;  // a plain scalar leaves out none
     p.complete(i);
   }
 }
@@ -128,7 +128,7 @@ const S* solve(FactoredProblem<S>& p) {
   for (int i = 0; i < p.size(); ++i) {
     FactoredContact<S>& c = p.contact(i);
     transpose_rows<M>(c);
-    respond<M>(c);
+    respond<M>(c, c.n_columns);
     const S minus[3] = {-c.n_offset[0], -c.n_offset[1], -c.n_offset[2]};
     add_transposed<M>(c, minus, p.scratch);
   }

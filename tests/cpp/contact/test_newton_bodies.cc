@@ -1,0 +1,250 @@
+// A Newton step that takes the contacts of a body together: it is the step over all dofs, and each
+// lane of a pack takes the one that it would take alone, bit for bit.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "check.h"
+#include "contact/newton_bodies.h"
+#include "contact/owned_problem.h"
+#include "scenes/quadruped.h"
+
+using namespace stickslip;
+using namespace stickslip::contact;
+using scenes::Random;
+
+namespace {
+
+using Column = std::array<double, 6>;
+
+/// What one lane knows of a body: columns of its twist, and the contacts that it has there.
+struct LaneBody {
+  std::vector<Column> columns;  // per dof of the body
+  std::vector<std::array<double, 3>> arms, offsets;
+  std::vector<double> frictions;
+  std::vector<bool> active;
+  int contacts() const { return int(std::count(active.begin(), active.end(), true)); }
+};
+
+/// Which dofs a body touches is the same in all lanes.
+struct Robot {
+  int dofs = 6;
+  std::vector<std::vector<int>> body_dofs;  // ascending; the base's first
+  std::vector<std::vector<LaneBody>> lanes;
+};
+
+/// A base with bodies on chains of joints, some of them on a joint that belongs to another's chain.
+Robot random_robot(Random& rng) {
+  Robot robot;
+  for (int b = 1 + rng.below(4); b > 0; --b) {
+    std::vector<int> dofs = {0, 1, 2, 3, 4, 5};
+    if (!robot.body_dofs.empty() && rng.below(3) == 0) {
+      const std::vector<int>& other = robot.body_dofs.back();
+      for (size_t k = 6; k < other.size() && rng.below(3) > 0; ++k) dofs.push_back(other[k]);
+    }
+    for (int k = rng.below(7); k > 0; --k) dofs.push_back(robot.dofs++);
+    robot.body_dofs.push_back(dofs);
+  }
+  return robot;
+}
+
+LaneBody random_lane(const std::vector<int>& dofs, int contacts, Random& rng) {
+  LaneBody body;
+  for (size_t k = 0; k < dofs.size(); ++k) {
+    Column& c = body.columns.emplace_back();
+    for (double& x : c) x = rng.normal();
+  }
+  const int idle = rng.below(4);
+  for (int i = 0; i < contacts; ++i) {
+    body.arms.push_back({0.1 * rng.normal(), 0.1 * rng.normal(), 0.1 * rng.normal()});
+    body.offsets.push_back({rng.normal(), rng.normal(), rng.normal() - 1});
+    body.frictions.push_back(rng.uniform());
+    body.active.push_back(idle == 0 ? false : idle == 1 ? rng.below(2) > 0 : true);
+  }
+  return body;
+}
+
+std::array<double, 3> at_arm(const Column& c, const std::array<double, 3>& d) {
+  return {c[0] + c[4] * d[2] - c[5] * d[1], c[1] + c[5] * d[0] - c[3] * d[2],
+          c[2] + c[3] * d[1] - c[4] * d[0]};
+}
+
+/// A joint of a lane: contacts below, of one body or more.
+struct Below {
+  int contacts = 0, bodies = 0;
+};
+
+/// The problem of some lanes of a robot, as ContactStage builds it: joints below one contact go to
+/// its private block.
+template <class S>
+void build(FactoredProblem<S>& p, const Robot& robot, const std::vector<int>& lanes) {
+  const auto gather = [&](auto&& number) {
+    S out = constant<S>(0);
+    for (size_t l = 0; l < lanes.size(); ++l) set_lane(out, int(l), number(lanes[l]));
+    return out;
+  };
+  const auto where = [&](auto&& holds) {
+    return gather([&](int lane) { return holds(lane) ? 1.0 : 0.0; }) > constant<S>(0.5);
+  };
+  std::vector<std::vector<Below>> below(robot.lanes.size(), std::vector<Below>(robot.dofs));
+  for (int lane : lanes)
+    for (size_t b = 0; b < robot.body_dofs.size(); ++b)
+      if (const int n = robot.lanes[lane][b].contacts())
+        for (int dof : robot.body_dofs[b])
+          below[lane][dof].contacts += n, ++below[lane][dof].bodies;
+  const auto shared = [&](int lane, int dof) { return dof < 6 || below[lane][dof].contacts > 1; };
+  const auto common = [&](int lane, int dof) { return dof < 6 || below[lane][dof].bodies > 1; };
+
+  p.clear(robot.dofs);
+  for (int k = 0; k < robot.dofs; ++k) p.w0[k] = constant<S>(0.1 * k);
+  for (size_t b = 0; b < robot.body_dofs.size(); ++b) {
+    const auto of = [&](int lane) -> const LaneBody& { return robot.lanes[lane][b]; };
+    std::vector<int> index;
+    for (int dof : robot.body_dofs[b])
+      if (std::any_of(lanes.begin(), lanes.end(), [&](int l) { return shared(l, dof); }))
+        index.push_back(dof);
+    const auto position = [&](int dof) {
+      const std::vector<int>& all = robot.body_dofs[b];
+      return std::find(all.begin(), all.end(), dof) - all.begin();
+    };
+    const int first = p.size();
+    for (size_t i = 0; i < of(lanes[0]).active.size(); ++i) {
+      const Mask<S> active = where([&](int lane) { return bool(of(lane).active[i]); });
+      if (!any(active)) continue;
+      FactoredContact<S>& c = p.contact(p.add());
+      p.set_index(p.size() - 1, index.data(), int(index.size()));
+      c.active = active;
+      c.friction = gather([&](int lane) { return of(lane).frictions[i]; });
+      const auto row = [&](int lane, int dof) {
+        return at_arm(of(lane).columns[position(dof)], of(lane).arms[i]);
+      };
+      for (size_t k = 0; k < index.size(); ++k) {
+        S y[3];
+        for (int r = 0; r < 3; ++r)
+          y[r] = gather(
+              [&](int lane) { return shared(lane, index[k]) ? row(lane, index[k])[r] : 0.0; });
+        c.y[k] = make_row3(y[0], y[1], y[2]);
+      }
+      for (int r = 0; r < 3; ++r) {
+        c.offset[r] = gather([&](int lane) { return of(lane).offsets[i][r]; });
+        c.arm[r] = gather([&](int lane) { return of(lane).arms[i][r]; });
+      }
+      for (int r = 0, at = 0; r < 3; ++r)
+        for (int s = r; s < 3; ++s, ++at)
+          c.private_block[at] = gather([&](int lane) {
+            double sum = 0;
+            for (int dof : robot.body_dofs[b])
+              if (!shared(lane, dof)) sum += row(lane, dof)[r] * row(lane, dof)[s];
+            return sum;
+          });
+    }
+    const Mask<S> several = where([&](int lane) { return of(lane).contacts() > 1; });
+    if (!any(several)) continue;
+    ContactBody<S>& body = p.add_body(first, p.size(), several);
+    for (int dof : index) {
+      const auto column_where = [&](auto&& holds) {
+        std::array<S, 6> column;
+        for (int r = 0; r < 6; ++r)
+          column[r] = gather([&](int lane) {
+            return of(lane).contacts() > 1 && holds(lane) ? of(lane).columns[position(dof)][r]
+                                                          : 0.0;
+          });
+        return column;
+      };
+      const auto owns = [&](int lane) { return !common(lane, dof); };
+      const auto leaves = [&](int lane) { return common(lane, dof); };
+      if (any(several & where(owns))) body.add_own(column_where(owns).data());
+      if (any(several & where(leaves))) body.add_left(dof, column_where(leaves).data());
+    }
+  }
+  for (int i = 0; i < p.size(); ++i) {
+    p.complete(i);
+    prepare_contact<0>(p.contact(i));
+  }
+  accumulate<0>(p);
+}
+
+/// Two sweeps, then Newton steps, each after another sweep.
+template <class S>
+void iterate(FactoredProblem<S>& p, bool by_bodies) {
+  const Mask<S> all = constant<S>(0) < constant<S>(1);
+  sweep<0, false>(p, all, constant<S>(1e-10));
+  for (int k = 0; k < 2; ++k) {
+    sweep<0, false>(p, all, constant<S>(1e-10));
+    if (by_bodies)
+      newton_step_by_bodies(p, all, constant<S>(1e-4));
+    else
+      newton_step<0>(p, all, constant<S>(1e-4));
+  }
+}
+
+template <class S>
+std::vector<S> result(const FactoredProblem<S>& p) {
+  std::vector<S> out(p.w, p.w + p.dofs());
+  for (int i = 0; i < p.size(); ++i) {
+    S l[3];
+    store(p.contact(i).lambda, l);
+    out.insert(out.end(), l, l + 3);
+  }
+  return out;
+}
+
+}  // namespace
+
+TEST(StepsByBodiesAreThoseOverAllDofsAndLanesHaveTheBitsOfThePlainScalar) {
+  using Wide = Pack<double, 4>;
+  constexpr FactoredCapacity kCapacity{24, 40};
+  Owned<double> plain(kCapacity), other(kCapacity);
+  Owned<Wide> wide(kCapacity);
+  Random rng(3);
+  double worst = 0;
+  long different = 0, single = 0, own = 0, left = 0, compared = 0;
+  for (int n = 0; n < 2000; ++n) {
+    Robot robot = random_robot(rng);
+    std::vector<int> contacts;
+    for (size_t b = 0; b < robot.body_dofs.size(); ++b) contacts.push_back(1 + rng.below(5));
+    for (int lane = 0; lane < 4; ++lane) {
+      auto& bodies = robot.lanes.emplace_back();
+      for (size_t b = 0; b < contacts.size(); ++b)
+        bodies.push_back(random_lane(robot.body_dofs[b], contacts[b], rng));
+    }
+    build(wide.p, robot, {0, 1, 2, 3});
+    for (int i = 0; i < wide.p.num_bodies(); ++i) {
+      own += wide.p.body(i).own_count();
+      left += wide.p.body(i).left_count() - 6;
+    }
+    for (int i = 0; i < wide.p.size(); ++i)
+      single += wide.p.contact(i).body >= 0 && wide.p.contact(i).single;
+    iterate(wide.p, true);
+    for (int lane = 0; lane < 4; ++lane) {
+      build(plain.p, robot, {lane});
+      iterate(plain.p, true);
+      build(other.p, robot, {lane});
+      iterate(other.p, false);
+      const std::vector<double> expected = result(other.p), got = result(plain.p);
+      double size = 1, error = 0;
+      for (size_t k = 0; k < got.size(); ++k) {
+        size = std::fmax(size, std::fabs(expected[k]));
+        error = std::fmax(error, std::fabs(got[k] - expected[k]));
+      }
+      worst = std::fmax(worst, error / size);
+      std::vector<double> of_lane;
+      for (int k = 0; k < robot.dofs; ++k) of_lane.push_back(get_lane(wide.p.w[k], lane));
+      for (int i = 0; i < wide.p.size(); ++i) {
+        if (!get_lane(wide.p.contact(i).active, lane)) continue;
+        Wide l[3];
+        store(wide.p.contact(i).lambda, l);
+        for (const Wide& x : l) of_lane.push_back(get_lane(x, lane));
+      }
+      CHECK(of_lane.size() == got.size());
+      for (size_t k = 0; k < got.size(); ++k) different += !(of_lane[k] == got[k]);
+      compared += long(got.size());
+    }
+  }
+  std::printf(
+      "  largest error %.1e, different %ld of %ld; single %ld, own dofs %ld, common joints %ld\n",
+      worst, different, compared, single, own, left);
+  CHECK(worst < 1e-7 && different == 0);
+  CHECK(single > 500 && own > 5000 && left > 500);
+}
