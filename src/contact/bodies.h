@@ -14,7 +14,6 @@ namespace stickslip::contact::inline STICKSLIP_KERNELS {
 template <class S>
 class ContactBody {
  public:
-  int first, end;   // its contacts
   Mask<S> several;  // lanes in which it has two or more; in others they stand for themselves
 
   void lay_out(Arena& arena, int dofs) {
@@ -59,7 +58,7 @@ class ContactBody {
   bool moves;               // a contact of it takes part
   S response[6][6];         // Q [kg, kg m, kg m^2]
   S offset[6];              // q [N s, N m s]
-  S* own_rows;              // (own_count, 8): column^T Q, column . q and the inverse pivot, passed
+  S* own_rows;              // (own_count, 8): column^T Q, column . q, inverse pivot; when passed
   Chunk<S>* response_rows;  // (6, chunks): Q^T columns of what is left
   S twist[6];               // V of the step
 

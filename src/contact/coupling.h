@@ -1,9 +1,9 @@
 // Which shared dofs couple in the matrix of a Newton step, and in what order they leave it.
 //
-// Two dofs couple if a contact touches both. Dofs are eliminated from the last to the first, which
-// in a tree (parents come first) couples no others: of a chain's dofs each couples with its
-// ancestors, and two legs only through the base. Index lists that are no tree fill in; what they
-// fill is in the lists too [George, Liu 1981, ch. 5].
+// Two dofs couple if a contact (or a body that stands for its contacts) touches both. Dofs are
+// eliminated from the last to the first, which in a tree (parents come first) couples no others: of
+// a chain's dofs each couples with its ancestors, and two legs only through the base. Index lists
+// that are no tree fill in; what they fill is in the lists too [George, Liu 1981, ch. 5].
 #pragma once
 #include "contact/arena.h"
 
@@ -51,7 +51,7 @@ class Coupling {
     eliminate();
   }
 
-  /// Whether any contact touches j; else it is not part of the matrix.
+  /// Whether any of them touches j; else it is not part of the matrix.
   bool touched(int j) const { return touched_[j / kBits] >> j % kBits & 1; }
   /// The dofs before j that it couples with when its turn comes, ascending.
   const int* list(int j) const { return lists_ + j * m_; }

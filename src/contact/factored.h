@@ -26,11 +26,12 @@ struct FactoredOptions {
   double residual_relative =
       0;  ///< ... plus this much of the largest free contact velocity (float needs it)
   double alpha = 1e-6;        ///< proximal weight of a first Newton step ...
-  double alpha_again = 1e-6;  ///< ... of those after another sweep ...
+  double alpha_again = 1e-6;  ///< ... of those after more sweeps ...
   double alpha_late = 1e-5;   ///< ... and from this sweep on, after each
   int late = 9;
   double enough = 1e-4;  ///< done: residual after a Newton step, in terms of the allowed one
-  int max_sweeps = 24;   ///< before the fallback; maximum dissipation takes up to 100 times as many
+  int max_sweeps = 24;   ///< before the fallback
+  int max_dissipation_sweeps = 1600;
   /// Leaves out a sweep that is expected to change less than the tolerance. For tolerances that the
   /// certificate can vouch for, with residual_tolerance.
   bool foresee = true;
@@ -54,7 +55,6 @@ FactoredOptions default_options() {
     o.alpha_again = 1e-3;
     o.alpha_late = 5e-3;
     o.enough = 0.1;
-    o.max_sweeps = 24;
   }
   return o;
 }
@@ -65,8 +65,7 @@ struct FactoredInfo {
   S allowed;          // what it may be [m/s]
   Mask<S> converged;  // residual within tolerance; false where an input is not finite (then the
                       // impulses are zero)
-  bool certified = false;  // the residual is that of the present impulses
-  int sweeps = 0;          // passes over all contacts
+  int sweeps = 0;     // passes over all contacts
   int newton_steps = 0;
   int resumed = 0;    // solves that went on after a sweep was left out in vain
   int fallbacks = 0;  // lanes that needed it
@@ -132,50 +131,61 @@ STICKSLIP_STAGE S certify(FactoredProblem<S>& p) {
   }
 }
 
-/// One guarded Newton step on the lanes `live`, in the form that suits the problem.
+/// One guarded Newton step on the lanes `live`, by bodies where the problem has some.
 template <int M, class S>
-STICKSLIP_INLINE void step_of(FactoredProblem<S>& p, Mask<S> live, S alpha) {
+STICKSLIP_INLINE void any_newton_step(FactoredProblem<S>& p, Mask<S> live, S alpha) {
   if (M == 0 && p.num_bodies() > 0)
     newton_step_by_bodies(p, live, alpha);
   else
     newton_step<M>(p, live, alpha);
 }
 
+/// How sweeps and Newton steps ended.
+template <class S>
+struct Outcome {
+  Mask<S> foreseen;        // lanes that left out a sweep
+  bool certified = false;  // a Newton step was the last:
+  S residual;              // that of the impulses [m/s]
+};
+
 /// Sweeps and Newton steps until in every lane of `live` the change is small, or the residual after
 /// a Newton step is at most `enough`, or, with `foresee`, the next sweep is expected to change
-/// little; or the cap. Returns the lanes that were foreseen.
+/// little; or the cap.
 template <int M, bool kMaxDissipation, class S>
-STICKSLIP_STAGE Mask<S> iterate(FactoredProblem<S>& p, Mask<S> live, S tolerance_squared, S enough,
-                                bool foresee, const FactoredOptions& o, FactoredInfo<S>& info) {
+STICKSLIP_STAGE Outcome<S> iterate(FactoredProblem<S>& p, Mask<S> live, S tolerance_squared,
+                                   S enough, bool foresee, const FactoredOptions& o,
+                                   FactoredInfo<S>& info) {
   constexpr int kEvery = 3;
+  Outcome<S> out;
   const S speed = constant<S>(0.1) * sqrt(tolerance_squared);
   S before = constant<S>(1e30);
-  Mask<S> only_swept = live, foreseen = live & !live;
-  const int cap = kMaxDissipation ? 100 * o.max_sweeps : o.max_sweeps;
+  Mask<S> only_swept = live;
+  out.foreseen = live & !live;
+  const int cap = kMaxDissipation ? o.max_dissipation_sweeps : o.max_sweeps;
   for (int k = 1;; ++k) {
     const S change = sweep<M, kMaxDissipation>(p, live, speed);
-    info.certified = false;
+    out.certified = false;
     ++info.sweeps;
     live = live & (change > tolerance_squared);
     const auto slow = live & (change * change > tolerance_squared * before);
     if (!kMaxDissipation && foresee && k >= 2) {
       const auto stops = live & only_swept & !slow;
-      foreseen = foreseen | stops;
+      out.foreseen = out.foreseen | stops;
       live = live & !stops;
     }
-    if (!any(live) || k >= cap) return foreseen;
+    if (!any(live) || k >= cap) return out;
     only_swept = live;
     before = change;
     const bool late = k >= o.late;
     if (kMaxDissipation || !(late || k % kEvery == 0) || !any(slow)) continue;
     const double alpha = late ? o.alpha_late : k > kEvery ? o.alpha_again : o.alpha;
-    step_of<M>(p, slow, constant<S>(alpha));
+    any_newton_step<M>(p, slow, constant<S>(alpha));
     ++info.newton_steps;
     only_swept = !slow;
-    info.residual = certify<M, kMaxDissipation>(p);
-    info.certified = true;
-    live = live & !(slow & (info.residual <= enough));
-    if (!any(live)) return foreseen;
+    out.residual = certify<M, kMaxDissipation>(p);
+    out.certified = true;
+    live = live & !(slow & (out.residual <= enough));
+    if (!any(live)) return out;
   }
 }
 
@@ -267,17 +277,17 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
   // The change of a sweep says little below what the residual has to reach.
   const S tolerance_squared =
       min(madd(relative * relative, fastest, absolute * absolute), allowed * allowed);
-  const S enough = constant<S>(o.enough) * allowed;
+  const S enough = min(constant<S>(o.enough) * allowed, sqrt(tolerance_squared));
   // False for NaN, and where products of block entries would overflow.
   const auto finite = sum < constant<S>(sizeof(Value<S>) == 4 ? 1e14 : 1e30);
-  const auto foreseen =
+  Outcome<S> out =
       iterate<M, kMaxDissipation>(p, finite, tolerance_squared, enough, o.foresee, o, info);
   // Which of the lanes are not solved. The residuals of others stay: float would evaluate them anew
   // without double's help.
   S worst = zero;
   const auto unsolved = [&](Mask<S> lanes) {
-    worst = select(lanes, info.certified ? info.residual : certify<M, kMaxDissipation>(p), worst);
-    info.certified = false;
+    worst = select(lanes, out.certified ? out.residual : certify<M, kMaxDissipation>(p), worst);
+    out.certified = false;
     auto bad = lanes & !(worst <= allowed);
     if (sizeof(Value<S>) == 4 && !kMaxDissipation && any(bad)) {
       worst = select(bad, certify_in_double<M>(p, bad), worst);
@@ -286,8 +296,8 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
     return bad;
   };
   auto bad = unsolved(finite);
-  if (const auto again = bad & foreseen; any(again)) {
-    iterate<M, kMaxDissipation>(p, again, tolerance_squared, enough, false, o, info);
+  if (const auto again = bad & out.foreseen; any(again)) {
+    out = iterate<M, kMaxDissipation>(p, again, tolerance_squared, enough, false, o, info);
     ++info.resumed;
     bad = (bad & !again) | unsolved(again);
   }

@@ -145,6 +145,7 @@ STICKSLIP_INLINE const Chunk<S>& row_chunk(const FactoredContact<S>& c, int r, i
 struct FactoredCapacity {
   int contacts = 0;
   int dofs = 0;
+  int bodies = 0;  // with several contacts
 };
 
 /// A factored problem and everything its solve needs. Memory is attached once; nothing allocates
@@ -218,8 +219,8 @@ class FactoredProblem {
     for (int k = 0; k < 6 && c.begins_with_six; ++k) c.begins_with_six = c.index[k] == k;
   }
 
-  /// The contacts [first, end), whose `active` is set, are on one body, several of them in these
-  /// lanes. The caller sets their `arm`, and the columns of the body.
+  /// The contacts [first, end), whose `active` is set, are on one body and touch the same dofs,
+  /// several of them in these lanes. The caller sets their `arm`, and the columns of the body.
   ContactBody<S>& add_body(int first, int end, Mask<S> several) {
     for (int i = first; i < end; ++i) {
       contacts_[i].body = num_bodies_;
@@ -227,7 +228,7 @@ class FactoredProblem {
     }
     ContactBody<S>& b = bodies_[num_bodies_++];
     b.clear();
-    b.first = first, b.end = end, b.several = several;
+    b.several = several;
     coupled_ = Coupled::kNot;
     return b;
   }
@@ -295,9 +296,9 @@ class FactoredProblem {
     given_ = arena.take<bool>(m);
     alternating_ = arena.take<bool>(m);
     for (int k = 0; memory && k < m; ++k) alternating_[k] = k & 1;
-    coupling.lay_out(arena, n, m);
-    bodies_ = arena.take<ContactBody<S>>(n / 2);
-    for (int i = 0; i < n / 2; ++i) {
+    coupling.lay_out(arena, n + capacity.bodies, m);
+    bodies_ = arena.take<ContactBody<S>>(capacity.bodies);
+    for (int i = 0; i < capacity.bodies; ++i) {
       ContactBody<S> unused;
       (memory ? bodies_[i] : unused).lay_out(arena, m);
     }
@@ -317,9 +318,10 @@ class FactoredProblem {
     }
     if constexpr (!kIsDouble) {
       lane = arena.template take<FactoredProblem<double>>(1);
-      const long inner = FactoredProblem<double>::required_bytes(capacity);
+      const FactoredCapacity without_bodies{n, m};
+      const long inner = FactoredProblem<double>::required_bytes(without_bodies);
       char* block = arena.template take<char>(inner + 64);
-      if (memory) lane->attach(block, capacity);
+      if (memory) lane->attach(block, without_bodies);
     }
     return arena.used();
   }

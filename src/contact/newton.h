@@ -101,7 +101,7 @@ STICKSLIP_INLINE void eliminate(NewtonBlock<T>& b, T alpha, Mask<T> live) {
   }
 }
 
-/// Columns of Y^T N of one contact over its shared dofs, by chunks; n: the columns of N.
+/// Columns of Y^T N of one contact over its shared dofs, by chunks; `columns` of N.
 template <int M, class S>
 STICKSLIP_INLINE void respond(FactoredContact<S>& c, const Row3<S> columns[3]) {
   const int chunks = chunk_count<M>(c);

@@ -46,23 +46,23 @@ template <class S>
 STICKSLIP_STAGE void pass_own_dofs(ContactBody<S>& b) {
   for (int k = b.own_count() - 1; k >= 0; --k) {
     const S* s = b.own_column(k);
-    S left[6], right[6];  // Q s, s^T Q
+    // Q s and s^T Q. Two chains each where the next joint would wait for one.
+    S left[6], right[6];
 #pragma GCC unroll 6
     for (int i = 0; i < 6; ++i) {
       const S* q = b.response[i];
-      left[i] = q[0] * s[0];
+      const S even = madd(q[4], s[4], madd(q[2], s[2], q[0] * s[0]));
+      const S odd = madd(q[5], s[5], madd(q[3], s[3], q[1] * s[1]));
+      left[i] = even + odd;
 #pragma GCC unroll 6
-      for (int j = 0; j < 6; ++j) {
-        if (j > 0) left[i] = madd(q[j], s[j], left[i]);
-        right[j] = i > 0 ? madd(q[j], s[i], right[j]) : q[j] * s[0];
-      }
+      for (int j = 0; j < 6; ++j) right[j] = i > 0 ? madd(q[j], s[i], right[j]) : q[j] * s[0];
     }
-    S pivot = constant<S>(1), offset = constant<S>(0);
+    const S even = madd(left[4], s[4], madd(left[2], s[2], left[0] * s[0]));
+    const S odd = madd(left[5], s[5], madd(left[3], s[3], left[1] * s[1]));
+    const S pivot = constant<S>(1) + (even + odd);
+    S offset = constant<S>(0);
 #pragma GCC unroll 6
-    for (int i = 0; i < 6; ++i) {
-      pivot = madd(left[i], s[i], pivot);
-      offset = madd(b.offset[i], s[i], offset);
-    }
+    for (int i = 0; i < 6; ++i) offset = madd(b.offset[i], s[i], offset);
     const S inverse = inverse_pivot(pivot);
 #pragma GCC unroll 6
     for (int i = 0; i < 6; ++i) {

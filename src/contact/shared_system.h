@@ -3,8 +3,8 @@
 //
 // Elimination without pivoting, from the last dof to the first: a breakdown shows as a huge or
 // non-finite x, which the caller rejects. Whatever the tiles and blocks below, each entry is summed
-// over the contacts in their order and meets the pivots in theirs, so that a lane of a pack has the
-// bits of the plain scalar, and of solve_fixed if it touches six dofs only.
+// over the contacts in their order, then over the bodies, and meets the pivots in theirs, so that a
+// lane of a pack has the bits of the plain scalar, and of solve_fixed if it touches six dofs only.
 #pragma once
 #include "contact/factored_problem.h"
 

@@ -28,11 +28,16 @@ struct ActiveContact {
 /// A link, not body 0, that takes part with several points.
 template <class S>
 struct TouchingLink {
-  dynamics::LinkIndex link;
   int first, end;                            // its contacts
   Mask<S> several;                           // lanes that have two or more of them
   Vec3<S> origin;                            // of the link, relative to the base origin
   dynamics::ContactRows<S> linear, angular;  // of its velocity at the origin
+};
+
+/// Lanes in which some contacts are active: one of them, two or more.
+template <class S>
+struct Occupied {
+  Mask<S> once, twice;
 };
 
 template <class S>
@@ -118,6 +123,7 @@ class ContactStage {
   void detect_within(const dynamics::Tree<S>& tree, S clearance, S reach, Mask<S> live);
   S fastest_shape(const dynamics::Tree<S>& tree, const Vec3<S>& base_velocity) const;
   void compute_rows(const dynamics::Tree<S>& tree);
+  Occupied<S> occupied(int first, int end) const;
   /// The link of the contacts [first, end), if a lane has several of them; else null.
   const TouchingLink<S>* add_link(const dynamics::Tree<S>& tree, int first, int end);
   /// Whether no two of the points in the list can have a joint in common.
@@ -156,4 +162,4 @@ class ContactStage {
 
 }  // namespace stickslip::step::inline STICKSLIP_KERNELS
 
-#include "step/contact_stage.inl"
+#include "step/contact_problem.inl"

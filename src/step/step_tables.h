@@ -16,7 +16,9 @@ struct RobotTables {
   int num_slots;  // of the tree's layout
   int max_depth;  // joints on the longest path
   int num_shapes, num_points;
+  int num_touching;  // links, not body 0, that can touch with several points
   const collide::GroundShape* shapes;
+  const int* by_body;                   // the shapes in the order of their bodies
   const double* restitution;            // per shape [1]
   const double* restitution_threshold;  // per shape [m/s]
   const bool* apart;                    // per shape: no joint above it moves more than one point

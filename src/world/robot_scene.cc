@@ -1,6 +1,8 @@
 #include "world/robot_scene.h"
 
 #include <algorithm>
+#include <map>
+#include <numeric>
 
 namespace stickslip::world {
 namespace {
@@ -35,6 +37,24 @@ std::unique_ptr<bool[]> find_apart(const std::vector<collide::GroundShape>& shap
   return apart;
 }
 
+/// Shapes sorted by body, so that contacts of a body follow each other whatever else touches.
+std::vector<int> sort_by_body(const std::vector<collide::GroundShape>& shapes) {
+  std::vector<int> order(shapes.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](int a, int b) { return shapes[a].body < shapes[b].body; });
+  return order;
+}
+
+/// Links but body 0 that can touch in several points.
+int count_touching(const std::vector<collide::GroundShape>& shapes) {
+  std::map<int, int> points;
+  for (const collide::GroundShape& s : shapes)
+    if (s.link.slot != dynamics::kBaseSlot) points[s.body] += s.num_points;
+  return static_cast<int>(std::count_if(points.begin(), points.end(),
+                                        [](const auto& body) { return body.second > 1; }));
+}
+
 /// How much of the last change of its impulse a point of each shape is expected to make again
 /// (docs/theory/solvers.md (C26a)): nearly all of it where three joints or more are its own, and so
 /// its impulse is determined. Elsewhere part of the impulses may only press the points against each
@@ -59,6 +79,7 @@ RobotScene::RobotScene(const Model& model, const dynamics::TreeLayout& layout,
       friction_(shapes_.size()),
       restitution_(shapes_.size()),
       threshold_(shapes_.size()),
+      by_body_(sort_by_body(shapes_)),
       apart_(find_apart(shapes_, layout)),
       foresight_(foresight(shapes_, layout, apart_.get())),
       prismatic_(new bool[model.num_joints()]),
@@ -78,7 +99,9 @@ RobotScene::RobotScene(const Model& model, const dynamics::TreeLayout& layout,
   t.max_depth = longest_path(layout);
   t.num_shapes = static_cast<int>(shapes_.size());
   t.num_points = collide::total_points(shapes_);
+  t.num_touching = count_touching(shapes_);
   t.shapes = shapes_.data();
+  t.by_body = by_body_.data();
   t.restitution = restitution_.data();
   t.restitution_threshold = threshold_.data();
   t.apart = apart_.get();

@@ -28,6 +28,7 @@ class RobotScene {
   std::vector<collide::GroundShape> shapes_;
   std::vector<MaterialPair> laws_;
   std::vector<double> friction_, restitution_, threshold_, damping_;
+  std::vector<int> by_body_;
   std::unique_ptr<bool[]> apart_;
   std::vector<double> foresight_;
   std::unique_ptr<bool[]> prismatic_;

@@ -2,6 +2,7 @@
 // different points.
 #pragma once
 #include "backend/environments.h"
+#include "step/chain.h"
 
 namespace environments {
 
@@ -17,7 +18,11 @@ struct ThrownTree {
   bool forces = false;
   StepSolverOptions solver = {};
 
-  ModelPtr model() const { return bodies::tree(seed, tree); }
+  bool balls = false;  // the chain whose shapes are interleaved, in place of a tree
+
+  ModelPtr model() const {
+    return balls ? bodies::chain(tree.base, true) : bodies::tree(seed, tree);
+  }
   World make_world() const {
     WorldOptions o = options(time_step, integrator);
     o.solver = solver;
@@ -100,6 +105,12 @@ inline std::vector<ThrownTree> thrown_trees() {
          10,
          false,
          dissipative});
+    for (const BaseType base : {BaseType::kFloating, BaseType::kFixed}) {
+      ThrownTree chain{
+          "interleaved balls", 6, {.joints = bodies::kLinks, .base = base}, 1e-3, {}, {}};
+      chain.balls = true;
+      add(chain);
+    }
     add({"cold starts", 13, {.joints = 6, .shapes = true}, 2e-3, {}, {}, 10, false, cold});
   }
   return out;

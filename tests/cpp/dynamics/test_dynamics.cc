@@ -1,5 +1,6 @@
 // The dynamics kernels against each other and across scalars. Pinocchio is the outside oracle
 // (tests/python).
+#include <cmath>
 #include <random>
 #include <vector>
 
@@ -265,6 +266,36 @@ void compare_lanes_with_double() {
 }
 
 }  // namespace
+
+TEST(RowsOfAPointAreThoseOfALinksMotion) {
+  for (const ModelPtr& model : robots()) {
+    Robots<double> r(*model, {random_state(*model, 40)});
+    compute_free_motion(r.t, r.input());
+    std::vector<LinkIndex> path(model->num_joints());
+    std::vector<Row3<double>> linear(model->num_joints()), angular(linear), direct(linear);
+    Row3<double> bases[3][6];
+    ContactRows<double> at_origin{0, path.data(), linear.data(), bases[0]},
+        turning{0, path.data(), angular.data(), bases[1]},
+        at_tip{0, path.data(), direct.data(), bases[2]};
+    for (const LinkIndex& link : r.memory.layout().link_of_body) {
+      const Vec3<double> origin = point_position(r.t, link, Vec3<double>{0.1, 0, -0.2}),
+                         tip = point_position(r.t, link, Vec3<double>{0.3, -0.4, 0.5});
+      compute_contact_rows(r.t, link, origin, at_origin);
+      compute_angular_rows(r.t, link, turning);
+      compute_contact_rows(r.t, link, tip, at_tip);
+      CHECK(turning.depth == at_tip.depth);
+      const auto compare = [&](const Row3<double>& v, const Row3<double>& w,
+                               const Row3<double>& expected) {
+        double row[3], other[3];
+        store(at_point(v, w, tip - origin), row);
+        store(expected, other);
+        for (int k = 0; k < 3; ++k) CHECK_NEAR(row[k], other[k], 1e-11 * (1 + std::fabs(other[k])));
+      };
+      for (int k = 0; k < at_tip.depth; ++k) compare(linear[k], angular[k], direct[k]);
+      for (int k = 0; k < 6 && r.t.floating; ++k) compare(bases[0][k], bases[1][k], bases[2][k]);
+    }
+  }
+}
 
 TEST(AScaleOfTheForcesScalesWhatIsSolved) {
   // A power of two: not a bit is lost.
