@@ -111,7 +111,7 @@ class Fallback {
     for (int i = 0; i < p_.size(); ++i) {
       const FactoredContact<double>& c = p_.contact(i);
       double dv[3], response[3];
-      store(add_rows<M>(c, x, make_row3(0.0, 0.0, 0.0)), dv);
+      change_of<M>(c, x, dv);
       store(madd(c.n_columns[2], dv[2], madd(c.n_columns[1], dv[1], c.n_columns[0] * dv[0])),
             response);
       for (int r = 0; r < 3; ++r) step()[3 * i + r] = -(c.n_offset[r] + response[r]);

@@ -59,12 +59,7 @@ STICKSLIP_INLINE void clear_inactive(FactoredContact<S>& c) {
   if (all(c.active)) return;
   // Not zero, so that it counts as opening; too small to show in a tolerance.
   const S zero = constant<S>(0), one = constant<S>(1), tiny = constant<S>(1e-30);
-  for (int k = 0; k < (M == 6 ? 6 : c.count); ++k) {
-    S y[3];
-    store(c.y[k], y);
-    for (S& x : y) x = select(c.active, x, zero);
-    c.y[k] = make_row3(y[0], y[1], y[2]);
-  }
+  for (int k = 0; k < (M == 6 ? 6 : c.count); ++k) c.y[k] = row_where(c.active, c.y[k]);
   for (int i = 0; i < 6; ++i)
     c.private_block[i] =
         select(c.active, c.private_block[i], i == 0 || i == 3 || i == 5 ? one : zero);
