@@ -4,13 +4,14 @@
 //
 // Rule between sweeps and Newton steps, per lane: with e_k the largest velocity change of sweep k,
 // e_k^2 / e_(k-1) is what the next one is expected to change. Where that is above the tolerance
-// after every third sweep, or each late one, a Newton step comes next, and where the certificate
-// then finds well below the allowed residual the lane is done. Else it is swept again. Or, with
-// `foresee`, if no Newton step lay between the last two sweeps, not at all: the lane stops, and
-// goes on only if the certificate says that it should have. Every third: a step costs several
-// sweeps, and lanes of a pack that need one take it together. Maximum dissipation ([Hwangbo 2018]
-// eq. 8) is not a complementarity problem in the velocity, so the Newton finish and the fallback do
-// not apply: it sweeps to the end, and its residual is |G_ii (lambda_i - local_i)|.
+// after every third sweep, or each late one, a Newton step comes next. Where the certificate then,
+// Newton step or not, finds well below the allowed residual the lane is done. Else it is swept
+// again. Or, with `foresee`, if no Newton step lay between the last two sweeps, not at all: the
+// lane stops, and goes on only if the certificate says that it should have. Every third: a step
+// costs several sweeps, and lanes of a pack take it, and end, together. Maximum dissipation
+// ([Hwangbo 2018] eq. 8) is not a complementarity problem in the velocity, so the Newton finish and
+// the fallback do not apply: it sweeps to the end, and its residual is
+// |G_ii (lambda_i - local_i)|.
 #pragma once
 #include "contact/jam.h"
 #include "contact/newton_bodies.h"
@@ -25,11 +26,10 @@ struct FactoredOptions {
   double residual_tolerance = 1e-8;  ///< converged: largest residual at most this [m/s]
   double residual_relative =
       0;  ///< ... plus this much of the largest free contact velocity (float needs it)
-  double alpha = 1e-6;        ///< proximal weight of a first Newton step ...
-  double alpha_again = 1e-6;  ///< ... of those after more sweeps ...
-  double alpha_late = 1e-5;   ///< ... and from this sweep on, after each
+  double alpha = 3e-8;       ///< proximal weight of Newton steps ...
+  double alpha_late = 1e-4;  ///< ... and from this sweep on, after each
   int late = 9;
-  double enough = 1e-4;  ///< done: residual after a Newton step, in terms of the allowed one
+  double enough = 1e-3;  ///< done: residual where the certificate is asked, in terms of the allowed
   int max_sweeps = 24;   ///< before the fallback
   int max_dissipation_sweeps = 1600;
   /// Leaves out a sweep that is expected to change less than the tolerance. For tolerances that the
@@ -51,8 +51,7 @@ FactoredOptions default_options() {
     // With less weight, Newton steps chase the rounding of redundant contacts; with more, they
     // creep where robots hang and slide. What is not solved after 24 sweeps seldom is (measured on
     // the tasks of benchmarks/compare and benchmarks/micro/lane_kernels.cc).
-    o.alpha = 5e-5;
-    o.alpha_again = 1e-3;
+    o.alpha = 3e-4;
     o.alpha_late = 5e-3;
     o.enough = 0.1;
   }
@@ -144,13 +143,13 @@ STICKSLIP_INLINE void any_newton_step(FactoredProblem<S>& p, Mask<S> live, S alp
 template <class S>
 struct Outcome {
   Mask<S> foreseen;        // lanes that left out a sweep
-  bool certified = false;  // a Newton step was the last:
+  bool certified = false;  // the certificate was the last:
   S residual;              // that of the impulses [m/s]
 };
 
-/// Sweeps and Newton steps until in every lane of `live` the change is small, or the residual after
-/// a Newton step is at most `enough`, or, with `foresee`, the next sweep is expected to change
-/// little; or the cap.
+/// Sweeps and Newton steps until in every lane of `live` the change is small, or the residual is at
+/// most `enough` where the certificate is asked, or, with `foresee`, the next sweep is expected to
+/// change little; or the cap.
 template <int M, bool kMaxDissipation, class S>
 STICKSLIP_STAGE Outcome<S> iterate(FactoredProblem<S>& p, Mask<S> live, S tolerance_squared,
                                    S enough, bool foresee, const FactoredOptions& o,
@@ -177,14 +176,15 @@ STICKSLIP_STAGE Outcome<S> iterate(FactoredProblem<S>& p, Mask<S> live, S tolera
     only_swept = live;
     before = change;
     const bool late = k >= o.late;
-    if (kMaxDissipation || !(late || k % kEvery == 0) || !any(slow)) continue;
-    const double alpha = late ? o.alpha_late : k > kEvery ? o.alpha_again : o.alpha;
-    any_newton_step<M>(p, slow, constant<S>(alpha));
-    ++info.newton_steps;
-    only_swept = !slow;
+    if (kMaxDissipation || !(late || k % kEvery == 0)) continue;
+    if (any(slow)) {
+      any_newton_step<M>(p, slow, constant<S>(late ? o.alpha_late : o.alpha));
+      ++info.newton_steps;
+      only_swept = !slow;
+    }
     out.residual = certify<M, kMaxDissipation>(p);
     out.certified = true;
-    live = live & !(slow & (out.residual <= enough));
+    live = live & !(out.residual <= enough);
     if (!any(live)) return out;
   }
 }
