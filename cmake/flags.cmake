@@ -9,7 +9,16 @@ if(CMAKE_CXX_COMPILER_ID MATCHES "Clang")
   # Masks of kernels are combined with & and |, also where a mask is a bool.
   target_compile_options(stickslip_flags_any_machine INTERFACE -Wno-bitwise-instead-of-logical)
 endif()
+# Structs of packs are copied by whole registers: a load waits long for narrower stores to the same place. Clang does so anyway.
+include(CheckCXXCompilerFlag)
+check_cxx_compiler_flag("-mmove-max=256 -mstore-max=256" STICKSLIP_WIDE_COPIES)
+function(stickslip_copy_by target scope bits)
+  if(STICKSLIP_WIDE_COPIES)
+    target_compile_options(${target} ${scope} -mmove-max=${bits} -mstore-max=${bits})
+  endif()
+endfunction()
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  stickslip_copy_by(stickslip_flags INTERFACE 256)
   # AVX2 + FMA (2013) is the minimum: madd() must be one instruction.
   target_compile_options(stickslip_flags INTERFACE -march=x86-64-v3)
 endif()
