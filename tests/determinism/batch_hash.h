@@ -2,6 +2,7 @@
 // batch is run (pack, threads, places, a snapshot in the middle) must not show in them.
 #pragma once
 #include "backend/staggered_task.h"
+#include "backend/thrown_trees.h"
 #include "tests/determinism/state_hash.h"
 
 namespace batch_hash {
@@ -115,9 +116,29 @@ inline std::string name(TaskKind kind, Integrator integrator, Precision precisio
          (precision == Precision::kFloat32 ? " float32" : " float64");
 }
 
+/// A crowd in float32.
+inline state_hash::Entry of_crowd(const ThrownTree& t) {
+  Batch batch = crowd(t, How{}.options(Precision::kFloat32), numbers(kEnvs));
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (int step = 0; step < kSteps; step += kEvery) {
+    batch.step(kEvery);
+    for (int env = 0; env < kEnvs; ++env)
+      hash = add_environment<float>(hash, row<float>(batch, BatchField::kQ, env),
+                                    row<float>(batch, BatchField::kU, env),
+                                    row<float>(batch, BatchField::kContactImpulse, env));
+  }
+  const bool floating = t.tree.base == BaseType::kFloating;
+  const std::string what =
+      std::string("batch of ") + t.name + (floating ? ", floating" : ", fixed");
+  return {state_hash::name(what.c_str(), options(t.time_step, t.integrator), kSteps) + " float32",
+          hash};
+}
+
 /// The float32 batches of golden.txt, by the pack that this machine takes.
 inline std::vector<state_hash::Entry> all(const ModelPtr& anymal) {
   std::vector<state_hash::Entry> out;
+  for (const ThrownTree& t : thrown_trees())
+    if (t.balls) out.push_back(of_crowd(t));  // with links in several contacts
   for (const Integrator integrator : kBoth)
     for (const TaskKind kind : kTasks)
       out.push_back({name(kind, integrator, Precision::kFloat32),

@@ -1,7 +1,9 @@
 // The factored solver on random contacts of a quadruped: 4 feet, feet and torso corners, soles with
 // several contacts.
+#include <algorithm>
 #include <cstdlib>
 #include <memory>
+#include <vector>
 
 #include "check.h"
 #include "contact/owned_problem.h"
@@ -131,6 +133,31 @@ TEST(SweepsThatWouldChangeNothingAreForeseenAndResumedWhereTheyWould) {
   CHECK(sweeps[1] < sweeps[0]);
   CHECK(resumed > 0);
   CHECK(fallbacks[1] <= fallbacks[0] + fallbacks[0] / 10);
+}
+
+TEST(AFinerToleranceIsMetWhereTheCertificateEndsTheSolve) {
+  // Else the certificate would be content with 1e-3 of the allowed residual, 1e-11 m/s.
+  Owned<double> f;
+  for (const bool fine : {false, true}) {
+    FactoredOptions o;
+    o.foresee = false;
+    if (fine) o.tolerance_absolute = 1e-13, o.tolerance_relative = 0;
+    std::vector<double> residuals;
+    for (int scene = 0; scene < kNumScenes; ++scene) {
+      Random rng(500 + scene);
+      for (int n = 0; n < 1000; ++n) {
+        const RobotProblem p = random_robot_problem(scene, rng);
+        fill(f.p, p, 0);
+        const auto info = solve_factored(f.p, o);
+        if (info.newton_steps > 0 && info.fallbacks == 0) residuals.push_back(info.residual);
+      }
+    }
+    std::sort(residuals.begin(), residuals.end());
+    const double most = residuals[residuals.size() * 99 / 100];
+    std::printf("  %s tolerance: 99 %% of %zu residuals below %.1e\n", fine ? "fine" : "default",
+                residuals.size(), most);
+    CHECK(fine ? most < 1e-12 : most > 1e-12);
+  }
 }
 
 TEST(FactoredEqualsDenseSweeps) {
