@@ -36,7 +36,7 @@ struct StepSolverOptions {
   SingleContactMethod single_contact = SingleContactMethod::kHalley;  ///< kPerContact only
   double tolerance = 1e-9;  ///< absolute part of the stopping test [m/s]; kAuto: of what a sweep
                             ///< changes or, at the defaults or above, the next one is expected
-                            ///< to, and of the residual that ends it after a Newton step
+                            ///< to; and, at every third sweep, of the residual
   double relative_tolerance = 1e-8;  ///< kAuto: part of the largest contact speed [1]
   int max_sweeps = 100'000;          ///< kPerContact, kPgs
   double alpha = 1.0, alpha_min = 0.7,

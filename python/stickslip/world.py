@@ -266,9 +266,9 @@ class World(Profiled):
     single_contact: "halley", "bisection", "golden_section" or "quartic"; for "per_contact".
     tolerance: where the contact solve stops. "auto": the change of the contact velocities in a sweep [m/s], added to
         relative_tolerance times the largest contact speed, at most 1e-8 (with both at their defaults or above, also the
-        change that the next sweep is expected to make), or a Newton step leaves far less than the allowed residual; it has converged when the largest contact residual
-        is at most 1e-8 m/s. "per_contact": the paper's sum of what each contact violates of its law [m/s]. "pgs": the paper's sum of
-        impulse updates [N s] and penetration velocities [m/s].
+        change that the next sweep is expected to make), or, at every third sweep, a residual far below the allowed one; it has
+        converged when the largest contact residual is at most 1e-8 m/s. "per_contact": the paper's sum of what each contact
+        violates of its law [m/s]. "pgs": the paper's sum of impulse updates [N s] and penetration velocities [m/s].
     max_sweeps, alpha, alpha_min, gamma: of "per_contact" (and alpha of "pgs"), as in `stickslip.solve`.
     warm_start: start each solve at the last step's impulses ("auto" with "semi_implicit": where those of the last two point).
     max_substeps: "energy_safe" cuts a step into at most this many parts when bodies turn fast.

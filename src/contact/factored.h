@@ -27,8 +27,8 @@ struct FactoredOptions {
   double residual_relative =
       0;  ///< ... plus this much of the largest free contact velocity (float needs it)
   double alpha = 3e-8;       ///< proximal weight of Newton steps ...
-  double alpha_late = 1e-4;  ///< ... and from this sweep on, after each
-  int late = 9;
+  double alpha_late = 1e-4;  ///< ... and of late ones
+  int late = 9;              ///< from this sweep on, a step after each
   double enough = 1e-3;  ///< done: residual where the certificate is asked, in terms of the allowed
   int max_sweeps = 24;   ///< before the fallback
   int max_dissipation_sweeps = 1600;
@@ -143,8 +143,8 @@ STICKSLIP_INLINE void any_newton_step(FactoredProblem<S>& p, Mask<S> live, S alp
 template <class S>
 struct Outcome {
   Mask<S> foreseen;        // lanes that left out a sweep
-  bool certified = false;  // the certificate was the last:
-  S residual;              // that of the impulses [m/s]
+  bool certified = false;  // the certificate came last, so that
+  S residual;              // is that of the impulses [m/s]
 };
 
 /// Sweeps and Newton steps until in every lane of `live` the change is small, or the residual is at

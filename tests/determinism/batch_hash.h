@@ -30,6 +30,8 @@ struct How {
   }
 };
 
+constexpr std::uint64_t kSeed = 0xcbf29ce484222325u;
+
 template <class T>
 std::uint64_t add(std::uint64_t hash, std::span<const T> values) {
   const auto* bytes = reinterpret_cast<const unsigned char*>(values.data());
@@ -44,13 +46,24 @@ std::uint64_t add_environment(std::uint64_t hash, std::span<const T> q, std::spa
   return add<T>(add<T>(add<T>(hash, q), u), impulse);
 }
 
+/// The same of all environments; number env is at place(env).
+template <class T, class Place>
+std::uint64_t add_environments(std::uint64_t hash, Batch& batch, const Place& place) {
+  const BatchArray q = batch.array(BatchField::kQ), u = batch.array(BatchField::kU),
+                   impulse = batch.array(BatchField::kContactImpulse);
+  for (int env = 0; env < kEnvs; ++env)
+    hash = add_environment<T>(hash, row<T>(q, place(env)), row<T>(u, place(env)),
+                              row<T>(impulse, place(env)));
+  return hash;
+}
+
 template <class T>
 std::uint64_t of_batch_as(const StaggeredTask& task, const World& world, Precision precision,
                           const How& how) {
   std::vector<Batch> batch;  // the one that runs
   batch.emplace_back(world, how.options(precision));
   const auto place = [&](int env) { return how.shuffled ? (7 * env + 3) % kEnvs : env; };
-  std::uint64_t hash = 0xcbf29ce484222325u;
+  std::uint64_t hash = kSeed;
   for (int step = 0; step < kSteps;) {
     if (how.reloaded && step == kSteps / 2) {
       const std::vector<std::uint8_t> saved = batch[0].save_state();
@@ -65,11 +78,7 @@ std::uint64_t of_batch_as(const StaggeredTask& task, const World& world, Precisi
         });
     batch[0].step(StaggeredTask::kHold);
     step += StaggeredTask::kHold;
-    if (step % kEvery == 0)
-      for (int env = 0; env < kEnvs; ++env)
-        hash = add_environment<T>(hash, row<T>(batch[0], BatchField::kQ, place(env)),
-                                  row<T>(batch[0], BatchField::kU, place(env)),
-                                  row<T>(batch[0], BatchField::kContactImpulse, place(env)));
+    if (step % kEvery == 0) hash = add_environments<T>(hash, batch[0], place);
   }
   return hash;
 }
@@ -89,7 +98,7 @@ inline std::uint64_t of_worlds(TaskKind kind, const ModelPtr& anymal, Integrator
   for (int env = 0; env < kEnvs; ++env) worlds.push_back(task.make_world(anymal, integrator));
   const std::vector<ContactPoint> points =
       Batch(worlds[0], batch_options(1, Precision::kFloat32)).contact_points();
-  std::uint64_t hash = 0xcbf29ce484222325u;
+  std::uint64_t hash = kSeed;
   for (int step = 0; step < kSteps;) {
     task.before(
         step, [&](int env, const State& s) { worlds[env].robot(0).set_state(s.q, s.u); },
@@ -116,16 +125,13 @@ inline std::string name(TaskKind kind, Integrator integrator, Precision precisio
          (precision == Precision::kFloat32 ? " float32" : " float64");
 }
 
-/// A crowd in float32.
+/// A crowd in float32, left to itself.
 inline state_hash::Entry of_crowd(const ThrownTree& t) {
   Batch batch = crowd(t, How{}.options(Precision::kFloat32), numbers(kEnvs));
-  std::uint64_t hash = 0xcbf29ce484222325u;
+  std::uint64_t hash = kSeed;
   for (int step = 0; step < kSteps; step += kEvery) {
     batch.step(kEvery);
-    for (int env = 0; env < kEnvs; ++env)
-      hash = add_environment<float>(hash, row<float>(batch, BatchField::kQ, env),
-                                    row<float>(batch, BatchField::kU, env),
-                                    row<float>(batch, BatchField::kContactImpulse, env));
+    hash = add_environments<float>(hash, batch, [](int env) { return env; });
   }
   const bool floating = t.tree.base == BaseType::kFloating;
   const std::string what =

@@ -1,184 +1,20 @@
 // A Newton step that takes the contacts of a body together: it is the step over all dofs, and each
 // lane of a pack takes the one that it would take alone, bit for bit.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <type_traits>
-#include <vector>
 
-#include "check.h"
-#include "contact/factored.h"
-#include "contact/owned_problem.h"
-#include "scenes/quadruped.h"
+#include "contact/body_problems.h"
 
-using namespace stickslip;
-using namespace stickslip::contact;
-using scenes::Random;
+using namespace body_problems;
 
 namespace {
 
-using Column = std::array<double, 6>;
-
-/// What one lane knows of a body: columns of its twist, and the contacts that it has there.
-struct LaneBody {
-  std::vector<Column> columns;  // per dof of the body
-  std::vector<std::array<double, 3>> arms, offsets;
-  std::vector<double> frictions;
-  std::vector<bool> active;
-  int contacts() const { return int(std::count(active.begin(), active.end(), true)); }
-};
-
-/// Which dofs a body touches is the same in all lanes.
-struct Robot {
-  int base;  // dofs of the base: 6 or 0
-  int dofs;
-  std::vector<std::vector<int>> body_dofs;  // ascending; the base's first
-  std::vector<std::vector<LaneBody>> lanes;
-};
-
-/// A floating or fixed base with bodies on chains of joints, some of them on a joint that belongs
-/// to another's chain.
-Robot random_robot(Random& rng) {
-  Robot robot;
-  robot.base = robot.dofs = rng.below(3) ? 6 : 0;
-  for (int b = 1 + rng.below(4); b > 0; --b) {
-    std::vector<int> dofs;
-    for (int k = 0; k < robot.base; ++k) dofs.push_back(k);
-    if (!robot.body_dofs.empty() && rng.below(3) == 0) {
-      const std::vector<int>& other = robot.body_dofs.back();
-      for (size_t k = robot.base; k < other.size() && rng.below(3) > 0; ++k)
-        dofs.push_back(other[k]);
-    }
-    for (int k = 1 + rng.below(6); k > 0; --k) dofs.push_back(robot.dofs++);
-    robot.body_dofs.push_back(dofs);
-  }
-  return robot;
-}
-
-LaneBody random_lane(const std::vector<int>& dofs, int contacts, Random& rng) {
-  LaneBody body;
-  for (size_t k = 0; k < dofs.size(); ++k) {
-    Column& c = body.columns.emplace_back();
-    for (double& x : c) x = rng.normal();
-  }
-  const int idle = rng.below(4);
-  for (int i = 0; i < contacts; ++i) {
-    body.arms.push_back({0.1 * rng.normal(), 0.1 * rng.normal(), 0.1 * rng.normal()});
-    body.offsets.push_back({rng.normal(), rng.normal(), rng.normal() - 1});
-    body.frictions.push_back(rng.uniform());
-    body.active.push_back(idle == 0 ? false : idle == 1 ? rng.below(2) > 0 : true);
-  }
-  return body;
-}
-
-std::array<double, 3> at_arm(const Column& c, const std::array<double, 3>& d) {
-  return {c[0] + c[4] * d[2] - c[5] * d[1], c[1] + c[5] * d[0] - c[3] * d[2],
-          c[2] + c[3] * d[1] - c[4] * d[0]};
-}
-
-/// A joint of a lane: contacts below, of one body or more.
-struct Below {
-  int contacts = 0, bodies = 0;
-};
-
-/// The problem of some lanes of a robot, as ContactStage builds it: joints below one contact go to
-/// its private block.
+/// Two sweeps and a Newton step of this proximal weight, twice; lanes in `once` are left out the
+/// second time.
 template <class S>
-void build(FactoredProblem<S>& p, const Robot& robot, const std::vector<int>& lanes) {
-  const auto gather = [&](auto&& number) {
-    S out = constant<S>(0);
-    for (size_t l = 0; l < lanes.size(); ++l) set_lane(out, int(l), Value<S>(number(lanes[l])));
-    return out;
-  };
-  const auto where = [&](auto&& holds) {
-    return gather([&](int lane) { return holds(lane) ? 1.0 : 0.0; }) > constant<S>(0.5);
-  };
-  std::vector<std::vector<Below>> below(robot.lanes.size(), std::vector<Below>(robot.dofs));
-  for (int lane : lanes)
-    for (size_t b = 0; b < robot.body_dofs.size(); ++b)
-      if (const int n = robot.lanes[lane][b].contacts())
-        for (int dof : robot.body_dofs[b])
-          below[lane][dof].contacts += n, ++below[lane][dof].bodies;
-  const auto shared = [&](int lane, int dof) {
-    return dof < robot.base || below[lane][dof].contacts > 1;
-  };
-  const auto common = [&](int lane, int dof) {
-    return dof < robot.base || below[lane][dof].bodies > 1;
-  };
-
-  p.clear(robot.dofs);
-  for (int k = 0; k < robot.dofs; ++k) p.w0[k] = constant<S>(0.1 * k);
-  for (size_t b = 0; b < robot.body_dofs.size(); ++b) {
-    const auto of = [&](int lane) -> const LaneBody& { return robot.lanes[lane][b]; };
-    std::vector<int> index;
-    for (int dof : robot.body_dofs[b])
-      if (std::any_of(lanes.begin(), lanes.end(), [&](int l) { return shared(l, dof); }))
-        index.push_back(dof);
-    const auto position = [&](int dof) {
-      const std::vector<int>& all = robot.body_dofs[b];
-      return std::find(all.begin(), all.end(), dof) - all.begin();
-    };
-    const int first = p.size();
-    for (size_t i = 0; i < of(lanes[0]).active.size(); ++i) {
-      const Mask<S> active = where([&](int lane) { return bool(of(lane).active[i]); });
-      if (!any(active)) continue;
-      FactoredContact<S>& c = p.contact(p.add());
-      p.set_index(p.size() - 1, index.data(), int(index.size()));
-      c.active = active;
-      c.friction = gather([&](int lane) { return of(lane).frictions[i]; });
-      const auto row = [&](int lane, int dof) {
-        return at_arm(of(lane).columns[position(dof)], of(lane).arms[i]);
-      };
-      for (size_t k = 0; k < index.size(); ++k) {
-        S y[3];
-        for (int r = 0; r < 3; ++r)
-          y[r] = gather(
-              [&](int lane) { return shared(lane, index[k]) ? row(lane, index[k])[r] : 0.0; });
-        c.y[k] = make_row3(y[0], y[1], y[2]);
-      }
-      for (int r = 0; r < 3; ++r) {
-        c.offset[r] = gather([&](int lane) { return of(lane).offsets[i][r]; });
-        c.arm[r] = gather([&](int lane) { return of(lane).arms[i][r]; });
-      }
-      for (int r = 0, at = 0; r < 3; ++r)
-        for (int s = r; s < 3; ++s, ++at)
-          c.private_block[at] = gather([&](int lane) {
-            double sum = 0;
-            for (int dof : robot.body_dofs[b])
-              if (!shared(lane, dof)) sum += row(lane, dof)[r] * row(lane, dof)[s];
-            return sum;
-          });
-    }
-    const Mask<S> several = where([&](int lane) { return of(lane).contacts() > 1; });
-    if (!any(several)) continue;
-    ContactBody<S>& body = p.add_body(first, p.size(), several);
-    for (int dof : index) {
-      const auto column_where = [&](auto&& holds) {
-        std::array<S, 6> column;
-        for (int r = 0; r < 6; ++r)
-          column[r] = gather([&](int lane) {
-            return of(lane).contacts() > 1 && holds(lane) ? of(lane).columns[position(dof)][r]
-                                                          : 0.0;
-          });
-        return column;
-      };
-      const auto owns = [&](int lane) { return !common(lane, dof); };
-      const auto leaves = [&](int lane) { return common(lane, dof); };
-      if (any(several & where(owns))) body.add_own(column_where(owns).data());
-      if (any(several & where(leaves))) body.add_left(dof, column_where(leaves).data());
-    }
-  }
-  for (int i = 0; i < p.size(); ++i) {
-    p.complete(i);
-    prepare_contact<0>(p.contact(i));
-  }
-  accumulate<0>(p);
-}
-
-/// Two sweeps and a Newton step, twice; lanes in `once` are left out the second time.
-template <class S>
-void iterate(FactoredProblem<S>& p, bool by_bodies, Mask<S> once) {
-  const S alpha = constant<S>(1e-4), fine = constant<S>(1e-10);
+void iterate(FactoredProblem<S>& p, bool by_bodies, double weight, Mask<S> once) {
+  const S alpha = constant<S>(weight), fine = constant<S>(1e-10);
   const Mask<S> all = alpha > constant<S>(0);
   const Mask<S> lives[] = {all, Mask<S>(all & !once)};
   for (const Mask<S> live : lives) {
@@ -190,144 +26,56 @@ void iterate(FactoredProblem<S>& p, bool by_bodies, Mask<S> once) {
   }
 }
 
-/// w and the impulses of a lane.
-template <class S>
-std::vector<double> result(const FactoredProblem<S>& p, int lane = 0) {
-  std::vector<double> out;
-  for (int k = 0; k < p.dofs(); ++k) out.push_back(get_lane(p.w[k], lane));
-  for (int i = 0; i < p.size(); ++i) {
-    if (!get_lane(p.contact(i).active, lane)) continue;
-    S l[3];
-    store(p.contact(i).lambda, l);
-    for (const S& x : l) out.push_back(get_lane(x, lane));
-  }
-  return out;
-}
-
-constexpr FactoredCapacity kCapacity{24, 40, 4};
-
-/// A robot with the states of as many lanes.
-Robot random_lanes(int lanes, Random& rng) {
-  Robot robot = random_robot(rng);
-  std::vector<int> contacts;
-  for (size_t b = 0; b < robot.body_dofs.size(); ++b) contacts.push_back(1 + rng.below(5));
-  for (int lane = 0; lane < lanes; ++lane) {
-    auto& bodies = robot.lanes.emplace_back();
-    for (size_t b = 0; b < contacts.size(); ++b)
-      bodies.push_back(random_lane(robot.body_dofs[b], contacts[b], rng));
-  }
-  return robot;
-}
-
-/// What the problems of a comparison had in them.
-struct Seen {
-  long single = 0, own = 0, common = 0;  // contacts alone on their body, own dofs, common joints
-  template <class S>
-  void add(FactoredProblem<S>& p, int base) {
-    for (int i = 0; i < p.num_bodies(); ++i) {
-      own += p.body(i).own_count();
-      common += p.body(i).left_count() - base;
-    }
-    for (int i = 0; i < p.size(); ++i) single += p.contact(i).body >= 0 && p.contact(i).single;
-  }
-};
-
-/// Runs f(problem, lanes) on packs and on each lane alone: no number may differ.
-template <class Wide, class F>
-void compare_lanes(unsigned seed, int problems, const F& f) {
-  using S = Value<Wide>;
-  constexpr int kWidth = ScalarTraits<Wide>::kWidth;
-  Owned<S> plain(kCapacity);
-  Owned<Wide> wide(kCapacity);
-  Random rng(seed);
-  long different = 0, compared = 0;
-  Seen seen;
-  for (int n = 0; n < problems; ++n) {
-    const Robot robot = random_lanes(kWidth, rng);
-    std::vector<int> lanes;
-    for (int lane = 0; lane < kWidth; ++lane) lanes.push_back(lane);
-    build(wide.p, robot, lanes);
-    seen.add(wide.p, robot.base);
-    f(wide.p, lanes);
-    for (int lane = 0; lane < kWidth; ++lane) {
-      build(plain.p, robot, {lane});
-      f(plain.p, std::vector<int>{lane});
-      const std::vector<double> expected = result(plain.p), got = result(wide.p, lane);
-      CHECK(got.size() == expected.size());
-      for (size_t k = 0; k < got.size(); ++k) different += !(got[k] == expected[k]);
-      compared += long(got.size());
-    }
-  }
-  std::printf("  different %ld of %ld; single %ld, own dofs %ld, common joints %ld\n", different,
-              compared, seen.single, seen.own, seen.common);
-  CHECK(different == 0 && seen.single > 50 && seen.own > 500 && seen.common > 50);
-}
-
 /// Sweeps and Newton steps, every other lane with fewer of them.
 template <class Wide>
 void compare_steps(unsigned seed) {
-  compare_lanes<Wide>(seed, 500, [](auto& p, const std::vector<int>& lanes) {
+  compare_lanes<Wide>(seed, 500, [](auto& p, const std::vector<int>& lanes, int) {
     using S = std::decay_t<decltype(p.w[0])>;
     S odd = constant<S>(0);
     for (size_t l = 0; l < lanes.size(); ++l) set_lane(odd, int(l), Value<S>(lanes[l] % 2));
-    iterate(p, true, odd > constant<S>(0));
+    iterate(p, true, 1e-4, odd > constant<S>(0));
+    return std::vector<S>{certify<0, false>(p)};
   });
 }
 
-/// Whole solves, to the fallback where one is needed; every fifth problem has a lane that is not
-/// finite.
-template <class Wide>
-void compare_solves(unsigned seed) {
-  long n = 0, fallbacks = 0, spoiled = 0;
-  compare_lanes<Wide>(seed, 150, [&](auto& p, const std::vector<int>& lanes) {
-    using S = std::decay_t<decltype(p.w[0])>;
-    if (lanes.size() > 1) ++n;
-    for (size_t l = 0; l < lanes.size(); ++l)
-      for (int i = 0; i < p.size() && n % 5 == 0 && lanes[l] == 1; ++i)
-        if (get_lane(p.contact(i).active, int(l))) {
-          set_lane(p.contact(i).offset[2], int(l), Value<S>(__builtin_nan("")));
-          break;
-        }
-    const auto info = solve_factored(p);
-    if (lanes.size() > 1) fallbacks += info.fallbacks;
-    for (size_t l = 0; l < lanes.size(); ++l) spoiled += !(get_lane(info.residual, int(l)) >= 0);
-    for (int i = 0; i < p.size(); ++i) set_impulse(p.contact(i), p.impulse(i));
-  });
-  std::printf("  fallbacks %ld, lanes that are not finite %ld\n", fallbacks, spoiled);
-  CHECK(fallbacks > 0 && spoiled > 20);
-}
-
-}  // namespace
-
-TEST(StepsByBodiesAreThoseOverAllDofs) {
+/// Differences between the results of steps by bodies and over all dofs as shares of their size,
+/// ascending.
+std::vector<double> errors_of_bodies(double alpha) {
   Owned<double> bodies(kCapacity), dofs(kCapacity);
   Random rng(3);
-  double worst = 0;
+  std::vector<double> errors;
   for (int n = 0; n < 4000; ++n) {
     const Robot robot = random_lanes(1, rng);
     build(bodies.p, robot, {0});
     build(dofs.p, robot, {0});
-    iterate(bodies.p, true, false);
-    iterate(dofs.p, false, false);
-    const std::vector<double> got = result(bodies.p), expected = result(dofs.p);
+    iterate(bodies.p, true, alpha, false);
+    iterate(dofs.p, false, alpha, false);
+    const std::vector<double> got = result(bodies.p, {certify<0, false>(bodies.p)}),
+                              expected = result(dofs.p, {certify<0, false>(dofs.p)});
     double size = 1, error = 0;
     for (size_t k = 0; k < got.size(); ++k) {
       size = std::fmax(size, std::fabs(expected[k]));
       error = std::fmax(error, std::fabs(got[k] - expected[k]));
     }
-    worst = std::fmax(worst, error / size);
+    errors.push_back(error / size);
   }
-  std::printf("  largest error %.1e\n", worst);
-  CHECK(worst < 1e-7);
+  std::sort(errors.begin(), errors.end());
+  std::printf("  alpha %.0e: median error %.1e, 99 %% %.1e, largest %.1e\n", alpha, errors[2000],
+              errors[3960], errors[3999]);
+  return errors;
+}
+
+}  // namespace
+
+TEST(StepsByBodiesAreThoseOverAllDofs) {
+  CHECK(errors_of_bodies(1e-4).back() < 1e-7);
+  // Some of the problems are singular but for the proximal weight.
+  const std::vector<double> errors = errors_of_bodies(default_options<double>().alpha);
+  CHECK(errors[3960] < 1e-7 && errors.back() < 1e-3);
 }
 
 TEST(LanesTakeTheStepsOfThePlainScalar) {
   compare_steps<Pack<double, 4>>(4);
   compare_steps<Pack<float, 8>>(5);
   compare_steps<Pack<float, 16>>(6);
-}
-
-TEST(LanesEndWhereThePlainScalarDoes) {
-  compare_solves<Pack<double, 4>>(7);
-  compare_solves<Pack<float, 8>>(8);
 }
