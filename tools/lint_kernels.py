@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Checks the kernel rules that a grep can see (CONTRIBUTING.md: one source for double, SIMD lanes and GPU threads).
 
-Kernel headers hold only our own arithmetic: no standard library, no libm, no Eigen, no approximate reciprocals, no
-exceptions, no allocation. Source files beside them may use the standard library, but nothing that makes bits depend on the
-machine or the run. Prints `file:line: what (why)` and exits 1 when it finds something.
+Kernels hold only our own arithmetic and include only kernels: no standard library, no libm, no Eigen, no approximate
+reciprocals, no exceptions, no allocation. The host side may use the standard library, but nothing that makes bits depend on
+the machine or the run. Prints `file:line: what (why)` and exits 1 when it finds something.
 """
 
 from __future__ import annotations
@@ -13,19 +13,12 @@ import sys
 from pathlib import Path
 
 KERNEL_FOLDERS = ("lane", "spatial", "dynamics", "collide", "contact", "step")
-# The host side (worlds, batches, solvers of the public API): held to the rules that keep bits equal, free to use the
-# standard library.
-HOST_FOLDERS = ("solvers", "world", "backend")
+# The host side (models, worlds, batches, solvers of the public API): held to the rules that keep bits equal, free to use
+# the standard library.
+HOST_FOLDERS = ("model", "layout", "solvers", "world", "backend")
 # Kernels in a folder of the host side: what is compiled per instruction set.
-KERNEL_FILES = {"backend/cpu/pack_kernels.cc", "backend/cpu/pack_lanes.h"}
+KERNEL_FILES = {"backend/cpu/pack_kernels.cc", "backend/cpu/pack_kernels.h", "backend/cpu/pack_lanes.h"}
 
-# Headers of kernel folders for the host side: they size memory and read models.
-HOST_HEADERS = {
-    "collide/ground_shapes.h",
-    "contact/method_of.h",
-    "dynamics/tree_layout.h",
-    "dynamics/tree_memory.h",
-}
 # Where a library's linear algebra serves: systems beyond robot size, which no step solves.
 LIBRARY_FILES = {"solvers/large_system.cc", "solvers/minimum_norm.cc"}
 # Compiler headers with vector instructions, only where the pack is made of them.
@@ -44,7 +37,7 @@ EVERYWHERE = [
 ]
 NO_LIBRARY = [(r"\bEigen\b", "Eigen is for systems beyond robot size, loading and tests")]
 KERNEL = [
-    (r"\bstd::", "kernel headers use no standard library"),
+    (r"\bstd::", "kernels use no standard library"),
     (rf"\b__builtin_({LIBM})f?\b", "libm differs between machines; use lane/math.h"),
     (r"\b(throw|try|catch)\b", "no exceptions in a kernel"),
     (r"\b(new|delete)\b|\b(malloc|calloc|free)\s*\(", "no allocation in a kernel"),
@@ -62,17 +55,20 @@ def without_comments(text: str) -> str:
     return re.sub(r"//[^\n]*|/\*.*?\*/|(?<!include )\"(?:\\.|[^\"\\\n])*\"", blank, text, flags=re.S)
 
 
+def is_kernel(name: str) -> bool:
+    """Of a path below src, as an #include spells it."""
+    return name.split("/")[0] in KERNEL_FOLDERS or name in KERNEL_FILES
+
+
 def findings(path: Path, name: str) -> list[str]:
     """What breaks a rule in the file that is called `name` below src."""
-    header = path.suffix in (".h", ".inl")
-    of_kernels = header and name.startswith(KERNEL_FOLDERS) and name not in HOST_HEADERS
-    kernel = of_kernels or name in KERNEL_FILES
+    kernel = is_kernel(name)
     rules = EVERYWHERE + (KERNEL if kernel else []) + ([] if name in LIBRARY_FILES else NO_LIBRARY)
     result = []
     for number, line in enumerate(without_comments(path.read_text(encoding="utf-8")).splitlines(), 1):
-        include = re.match(r"\s*#\s*include\s*<([^>]+)>", line)
-        if kernel and include and include[1] not in INTRINSICS.get(name, ()):
-            result.append(f"{path}:{number}: #include <{include[1]}> (kernel headers include only our own headers)")
+        include = re.match(r"\s*#\s*include\s*[<\"]([^>\"]+)", line)
+        if kernel and include and not is_kernel(include[1]) and include[1] not in INTRINSICS.get(name, ()):
+            result.append(f"{path}:{number}: #include {include[1]} (kernels include only kernels)")
         for pattern, why in rules:
             if found := re.search(pattern, line):
                 result.append(f"{path}:{number}: {found[0].strip()} ({why})")
@@ -87,7 +83,7 @@ def main() -> int:
         for path in (source / folder).rglob("*")
         if path.suffix in (".h", ".inl", ".cc", ".cu")
     )
-    missing = [name for name in sorted(HOST_HEADERS | LIBRARY_FILES | KERNEL_FILES) if not (source / name).is_file()]
+    missing = [name for name in sorted(LIBRARY_FILES | KERNEL_FILES) if not (source / name).is_file()]
     found = [f"{name}: listed here, but there is no such file" for name in missing]
     found += [line for path in files for line in findings(path, path.relative_to(source).as_posix())]
     print("\n".join(found) if found else f"kernel rules: {len(files)} files, nothing found")

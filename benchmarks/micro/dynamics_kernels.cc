@@ -18,7 +18,7 @@
 
 #include "dynamics/dynamics.h"
 #include "dynamics/random_robots.h"
-#include "dynamics/tree_memory.h"
+#include "layout/tree_memory.h"
 
 using namespace stickslip;
 using namespace stickslip::dynamics;
@@ -65,7 +65,7 @@ std::vector<double> random_state(int joints, int lane) {
 /// One robot, or a pack of them, with a state per lane.
 template <class S>
 struct Robots {
-  TreeMemory<S> memory;
+  layout::TreeMemory<S> memory;
   Tree<S>& t;
   std::vector<S> q, rates, tau, diagonal, out;
   S quaternion[4], base[6];

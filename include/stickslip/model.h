@@ -1,6 +1,6 @@
 // The immutable description of one robot: a tree of rigid bodies, its joints, frames and collision
 // shapes. Plain double data in URDF conventions; the kernels derive their own layout from it
-// (src/dynamics/tree_layout.h).
+// (src/layout/tree_layout.h).
 #pragma once
 #include <array>
 #include <memory>

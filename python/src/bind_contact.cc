@@ -6,8 +6,8 @@
 #include <stickslip/errors.h>
 
 #include "bindings.h"
-#include "contact/method_of.h"
 #include "scenes/time_methods.h"
+#include "solvers/method_of.h"
 #include "solvers/solve.h"
 #include "words.h"
 
@@ -155,7 +155,7 @@ nb::list time_single_contact(const VectorIn& delassus, const VectorIn& free_velo
     const SingleContactMethod method = choice("method", m, kSingleContactMethods);
     if (method == SingleContactMethod::kGoldenSection && !max_dissipation)
       throw ModelError("time_single_contact: golden_section has no form for law coulomb");
-    kernels.push_back(contact::method_of(method));
+    kernels.push_back(solvers::method_of(method));
   }
   const std::size_t n = friction.size();
   if (n == 0 || delassus.size() != 9 * n || free_velocity.size() != 3 * n)

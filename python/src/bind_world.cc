@@ -9,7 +9,7 @@
 #include <algorithm>
 
 #include "bindings.h"
-#include "collide/ground_shapes.h"
+#include "layout/ground_shapes.h"
 #include "words.h"
 
 namespace nb = nanobind;
@@ -217,7 +217,7 @@ void bind_robot(nb::module_& m) {
 void bind_world(nb::module_& m) {
   bind_records(m);
   bind_robot(m);
-  m.def("unsupported_shapes", &collide::unsupported_shapes, "model"_a,
+  m.def("unsupported_shapes", &layout::unsupported_shapes, "model"_a,
         "Indices of shapes that no contact is computed for.");
   nb::class_<World>(m, "World")
       .def("__init__", &init_world, "time_step"_a, "gravity"_a, "integrator"_a, "max_substeps"_a,

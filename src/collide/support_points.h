@@ -1,7 +1,7 @@
 // Support points of shapes against a horizontal plane: a center and a radius each; a point touches
 // the plane straight below its center.
 #pragma once
-#include "collide/ground_shapes.h"
+#include "collide/ground_shape.h"
 #include "dynamics/kinematics.h"
 
 namespace stickslip::collide::inline STICKSLIP_KERNELS {
@@ -40,13 +40,13 @@ STICKSLIP_INLINE Mat3<S> shape_rotation(const GroundShape& shape) {
 template <class S>
 STICKSLIP_INLINE S lowest_point(const dynamics::Tree<S>& tree, const GroundShape& shape) {
   const S center = dynamics::point_height(tree, shape.link, constant3<S>(shape.center));
-  if (shape.type == ShapeType::kSphere) return center - constant<S>(shape.radius);
+  if (shape.type == GroundShapeType::kSphere) return center - constant<S>(shape.radius);
   const Vec3<S> up = dynamics::heights_of_axes(tree, shape.link);
   const Mat3<S> axes = shape_rotation<S>(shape);
   const auto reach = [&](int k) {
     return abs(dot(up, column(axes, k))) * constant<S>(shape.half[k]);
   };
-  if (shape.type == ShapeType::kBox) return center - (reach(0) + reach(1) + reach(2));
+  if (shape.type == GroundShapeType::kBox) return center - (reach(0) + reach(1) + reach(2));
   // A capsule; a cylinder lies inside the capsule-like bound radius + half length * |axis|.
   return center - (constant<S>(shape.half[0]) + reach(2));
 }
@@ -56,7 +56,7 @@ template <class S>
 PlacedShape<S> place(const dynamics::Tree<S>& tree, const GroundShape& shape) {
   PlacedShape<S> p;
   p.center = shape_center(tree, shape);
-  if (shape.type != ShapeType::kSphere)
+  if (shape.type != GroundShapeType::kSphere)
     p.axes = dynamics::link_rotation(tree, shape.link) * shape_rotation<S>(shape);
   return p;
 }
@@ -92,15 +92,15 @@ Vec3<S> support_point(const GroundShape& shape, const PlacedShape<S>& placed, in
     return constant<S>((point & bit ? 1.0 : -1.0) * shape.half[axis]);
   };
   switch (shape.type) {
-    case ShapeType::kBox:
+    case GroundShapeType::kBox:
       c = madd(column(placed.axes, 0), half(0, 1), c);
       c = madd(column(placed.axes, 1), half(1, 2), c);
       c = madd(column(placed.axes, 2), half(2, 4), c);
       break;
-    case ShapeType::kCapsule:
+    case GroundShapeType::kCapsule:
       c = madd(column(placed.axes, 2), half(2, 1), c);
       break;
-    case ShapeType::kCylinder:
+    case GroundShapeType::kCylinder:
       c = rim_point(shape, placed, point);
       break;
     default:

@@ -9,12 +9,12 @@
 #include <cmath>
 #include <cstddef>
 
-#include "contact/method_of.h"
 #include "solvers/admm.h"
 #include "solvers/certify.h"
 #include "solvers/chain.h"
 #include "solvers/explicit_view.h"
 #include "solvers/interior_point.h"
+#include "solvers/method_of.h"
 #include "solvers/minimum_norm.h"
 #include "solvers/prox_newton.h"
 #include "solvers/recorded_sweeps.h"
@@ -41,7 +41,7 @@ double allowed_residual(const ContactProblem& problem, const SolveOptions& o) {
 contact::SweepOptions sweep_options(const SolveOptions& o, double tolerance) {
   contact::SweepOptions s;
   s.max_dissipation = is_max_dissipation(o.law);
-  s.method = contact::method_of(o.single_contact);
+  s.method = solvers::method_of(o.single_contact);
   s.stop = static_cast<contact::StopTest>(o.stop);
   s.tolerance = tolerance, s.max_sweeps = o.max_sweeps;
   s.alpha = o.alpha, s.alpha_min = o.alpha_min, s.gamma = o.gamma;
@@ -255,7 +255,7 @@ SingleContactResult solve_contact(const double delassus[9], const double free_ve
   const double stop = halley ? options.tolerance * speed : options.tolerance;
   SingleContactResult r{};
   contact::with_method(
-      contact::method_of(options.method), is_max_dissipation(options.law), [&](auto m, auto law) {
+      solvers::method_of(options.method), is_max_dissipation(options.law), [&](auto m, auto law) {
         const auto s = contact::solve_single<decltype(m)::value, decltype(law)::value>(
             e.view.local[0], c, stop);
         r.impulse[0] = s.x, r.impulse[1] = s.y, r.impulse[2] = s.z;

@@ -26,10 +26,11 @@ void ContactStage<S>::lay_out(contact::Arena& arena, const RobotTables& tables) 
   for (int i = 0; i < points; ++i) lay_out_rows(active_ ? &active_[i].rows : nullptr);
   touching_ = arena.take<TouchingLink<S>>(tables.num_touching);
   for (int i = 0; i < tables.num_touching; ++i) {
-    for (auto rows : {&TouchingLink<S>::linear, &TouchingLink<S>::angular}) {
-      lay_out_rows(touching_ ? &(touching_[i].*rows) : nullptr);
+    for (int k = 0; k < 2; ++k) {
+      auto* rows = !touching_ ? nullptr : k == 0 ? &touching_[i].linear : &touching_[i].angular;
+      lay_out_rows(rows);
       auto* base = arena.take<Row3<S>>(6);
-      if (touching_) (touching_[i].*rows).base = base;
+      if (rows) rows->base = base;
     }
   }
   const contact::FactoredCapacity capacity{points > 0 ? points : 1, dofs, tables.num_touching};

@@ -78,8 +78,8 @@ struct RobotLanes {
     contacts.lay_out(arena, t);
     q_new = arena.take<S>(t.nq);
     q_moved = arena.take<S>(t.nq);
-    for (S** array : {&u_free, &u_plus, &u_new, &rates, &force, &delta, &gravity_acceleration})
-      *array = arena.take<S>(t.nu);
+    S** const per_dof[] = {&u_free, &u_plus, &u_new, &rates, &force, &delta, &gravity_acceleration};
+    for (S** array : per_dof) *array = arena.take<S>(t.nu);
     implicit = arena.take<S>(t.num_joints);
     start_impulse = arena.take<S>(3 * t.num_points);
     backup.q = arena.take<S>(t.nq);

@@ -1,7 +1,7 @@
 // What a step reads of a model and of a world's options. Plain data, the same for every instruction
 // set; a lane is an environment (batches) or the only robot (worlds).
 #pragma once
-#include "collide/ground_shapes.h"
+#include "collide/ground_shape.h"
 
 namespace stickslip::step {
 

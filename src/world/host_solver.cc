@@ -4,10 +4,10 @@
 #include <chrono>
 
 #include "contact/explicit_problem.h"
-#include "contact/method_of.h"
 #include "contact/per_contact.h"
 #include "contact/pgs.h"
 #include "solvers/chain.h"
+#include "solvers/method_of.h"
 
 namespace stickslip::world {
 namespace {
@@ -50,7 +50,7 @@ step::HostSolver::Effort SolverOnHost::run_method(void* self, step::DenseProblem
   contact::ExplicitProblem p = view_of(d, reinterpret_cast<double*>(solver.memory_.data()));
   contact::SweepOptions o;
   o.max_dissipation = options.law == FrictionLaw::kMaxDissipation;
-  o.method = contact::method_of(options.single_contact);
+  o.method = solvers::method_of(options.single_contact);
   o.stop = options.method == SolveMethod::kPgs ? contact::StopTest::kUpdateSum
                                                : contact::StopTest::kViolationSum;
   o.tolerance = options.tolerance;

@@ -2,7 +2,7 @@
 #pragma once
 #include <stickslip/world.h>
 
-#include "dynamics/tree_memory.h"
+#include "layout/tree_memory.h"
 #include "step/robot_lanes.h"
 #include "world/host_solver.h"
 #include "world/robot_scene.h"
@@ -41,7 +41,7 @@ struct RobotData {
   RobotOptions options;
   RobotState state;
   RobotControl control;
-  dynamics::TreeMemory<double> memory;
+  layout::TreeMemory<double> memory;
   RobotScene scene;
   SolverOnHost host;
   step::RobotLanes<double> lanes;  // one lane: this robot

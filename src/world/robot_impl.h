@@ -19,7 +19,7 @@ struct Robot::Impl {
   void collect_contacts();
 
   world::RobotData data;
-  dynamics::TreeMemory<double> query;
+  layout::TreeMemory<double> query;
   std::vector<RigidInertia<dynamics::Wide<double>>> scratch;
   std::vector<double> velocity;  // scratch (nu)
   std::vector<Contact> contacts;

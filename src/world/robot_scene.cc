@@ -4,10 +4,12 @@
 #include <map>
 #include <numeric>
 
+#include "layout/ground_shapes.h"
+
 namespace stickslip::world {
 namespace {
 
-int longest_path(const dynamics::TreeLayout& layout) {
+int longest_path(const layout::TreeLayout& layout) {
   int deepest = 0;
   for (int j = 0; j < layout.num_joints; ++j) {
     int depth = 0;
@@ -18,14 +20,14 @@ int longest_path(const dynamics::TreeLayout& layout) {
 }
 
 template <class F>
-void for_joints_above(const dynamics::TreeLayout& layout, dynamics::LinkIndex link, const F& f) {
+void for_joints_above(const layout::TreeLayout& layout, dynamics::LinkIndex link, const F& f) {
   if (link.slot == dynamics::kBaseSlot) return;
   for (int j = layout.slots[link.slot].joint[link.lane]; j >= 0; j = layout.parent_joint[j]) f(j);
 }
 
 /// Per shape, whether no joint above it moves more than one support point.
 std::unique_ptr<bool[]> find_apart(const std::vector<collide::GroundShape>& shapes,
-                                   const dynamics::TreeLayout& layout) {
+                                   const layout::TreeLayout& layout) {
   std::vector<int> points(layout.num_joints);  // that a joint moves
   for (const collide::GroundShape& s : shapes)
     for_joints_above(layout, s.link, [&](int j) { points[j] += s.num_points; });
@@ -60,7 +62,7 @@ int count_touching(const std::vector<collide::GroundShape>& shapes) {
 /// its impulse is determined. Elsewhere part of the impulses may only press the points against each
 /// other. No solve damps that part, this factor has to.
 std::vector<double> foresight(const std::vector<collide::GroundShape>& shapes,
-                              const dynamics::TreeLayout& layout, const bool* apart) {
+                              const layout::TreeLayout& layout, const bool* apart) {
   std::vector<double> part;
   for (size_t k = 0; k < shapes.size(); ++k) {
     int joints = 0;
@@ -72,9 +74,9 @@ std::vector<double> foresight(const std::vector<collide::GroundShape>& shapes,
 
 }  // namespace
 
-RobotScene::RobotScene(const Model& model, const dynamics::TreeLayout& layout,
+RobotScene::RobotScene(const Model& model, const layout::TreeLayout& layout,
                        const RobotOptions& options)
-    : shapes_(collide::ground_shapes(model, layout)),
+    : shapes_(layout::ground_shapes(model, layout)),
       laws_(shapes_.size()),
       friction_(shapes_.size()),
       restitution_(shapes_.size()),
@@ -98,7 +100,7 @@ RobotScene::RobotScene(const Model& model, const dynamics::TreeLayout& layout,
   t.num_slots = layout.num_slots;
   t.max_depth = longest_path(layout);
   t.num_shapes = static_cast<int>(shapes_.size());
-  t.num_points = collide::total_points(shapes_);
+  t.num_points = layout::total_points(shapes_);
   t.num_touching = count_touching(shapes_);
   t.shapes = shapes_.data();
   t.by_body = by_body_.data();

@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "layout/tree_layout.h"
 #include "step/step_tables.h"
 
 namespace stickslip::world {
@@ -13,7 +14,7 @@ namespace stickslip::world {
 class RobotScene {
  public:
   /// `layout` must outlive the scene.
-  RobotScene(const Model& model, const dynamics::TreeLayout& layout, const RobotOptions& options);
+  RobotScene(const Model& model, const layout::TreeLayout& layout, const RobotOptions& options);
   RobotScene(const RobotScene&) = delete;
   RobotScene& operator=(const RobotScene&) = delete;
 

@@ -62,6 +62,8 @@ def test_kernels_keep_their_rules() -> None:
     [
         "#include <cmath>",
         "#include <vector>",
+        "#include <stickslip/model.h>",
+        '#include "layout/tree_layout.h"',
         "double y = std::sqrt(x);",
         "double y = __builtin_sin(x);",
         "__m256 y = _mm256_rsqrt_ps(x);",

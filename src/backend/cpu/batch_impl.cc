@@ -31,7 +31,7 @@ const PackKernels& choose_kernels(const BatchOptions& o) {
                    (set.empty() ? "" : " for " + set));
 }
 
-std::size_t constants_bytes(const dynamics::TreeLayout& layout, const PackKernels& kernels) {
+std::size_t constants_bytes(const layout::TreeLayout& layout, const PackKernels& kernels) {
   return std::max(1, layout.num_slots) * sizeof(dynamics::LinkConstants<double>) *
          kernels.bundle_lanes;
 }
@@ -95,11 +95,11 @@ Batch::Impl::Hold::Hold(Impl& batch, const char* what) : batch_(batch) {
 void Batch::Impl::fill_pack_scene() {
   constants = world::AlignedBlock(constants_bytes(layout, *kernels));
   if (kernels->single)
-    dynamics::write_constants(layout, kernels->bundle_lanes,
-                              reinterpret_cast<float*>(constants.data()));
+    layout::write_constants(layout, kernels->bundle_lanes,
+                            reinterpret_cast<float*>(constants.data()));
   else
-    dynamics::write_constants(layout, kernels->bundle_lanes,
-                              reinterpret_cast<double*>(constants.data()));
+    layout::write_constants(layout, kernels->bundle_lanes,
+                            reinterpret_cast<double*>(constants.data()));
   backend::PackScene& p = pack_scene;
   p.tables = &scene.tables();
   p.num_bundles = static_cast<int>(layout.bundles.size());

@@ -8,6 +8,7 @@
 #include "backend/cpu/body_parameters.h"
 #include "backend/cpu/instruction_sets.h"
 #include "backend/cpu/thread_pool.h"
+#include "layout/tree_layout.h"
 #include "world/host_solver.h"
 #include "world/robot_scene.h"
 #include "world/world_impl.h"
@@ -56,7 +57,7 @@ struct Batch::Impl {
   std::string robot_name;
   const backend::PackKernels* kernels;
   std::string instruction_set;
-  dynamics::TreeLayout layout;
+  layout::TreeLayout layout;
   world::RobotScene scene;
   world::AlignedBlock constants;
   backend::PackScene pack_scene;

@@ -4,13 +4,13 @@
 #pragma once
 #include "backend/cpu/batch_memory.h"
 #include "backend/cpu/pack_kernels.h"
-#include "dynamics/tree_layout.h"
+#include "layout/tree_layout.h"
 
 namespace stickslip::backend {
 
 class BodyParameters {
  public:
-  BodyParameters(const Model& model, const dynamics::TreeLayout& layout, const PackKernels& kernels,
+  BodyParameters(const Model& model, const layout::TreeLayout& layout, const PackKernels& kernels,
                  long padded)
       : model_(model), layout_(layout), kernels_(kernels), padded_(padded) {}
 
@@ -37,7 +37,7 @@ class BodyParameters {
   void turn(BatchMemory& memory, long env);
 
   const Model& model_;
-  const dynamics::TreeLayout& layout_;
+  const layout::TreeLayout& layout_;
   const PackKernels& kernels_;
   long padded_;
   world::AlignedBlock links_, base_;

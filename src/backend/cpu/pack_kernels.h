@@ -2,15 +2,13 @@
 // number format. What goes in and out is plain data, so that code of different instruction sets
 // shares it.
 #pragma once
-#include <cstdint>
-
 #include "lane/lane.h"
 #include "step/step_tables.h"
 
 namespace stickslip::backend {
 
-using StatusBits = std::uint32_t;  // StepStatus
-using Flag = std::uint8_t;         // 0 or 1
+using StatusBits = unsigned int;  // StepStatus
+using Flag = unsigned char;       // 0 or 1
 
 /// A robot as kernels of one pack shape see it. T: float or double.
 struct PackScene {

@@ -77,7 +77,9 @@ void PackLanes<S>::lay_out(contact::Arena& arena, const PackScene& scene) {
   s.earlier_impulse = arena.take<S>(3 * t.num_points);
   s.drift_acceleration = arena.take<S>(t.nu);
   force_ = arena.take<S>(t.nu);
-  for (S** array : {&kp_, &damping_, &target_}) *array = arena.take<S>(t.num_joints);
+  kp_ = arena.take<S>(t.num_joints);
+  damping_ = arena.take<S>(t.num_joints);
+  target_ = arena.take<S>(t.num_joints);
   friction_ = arena.take<S>(t.num_shapes);
   gravity_ = arena.take<S>(3);
   last_q_ = arena.take<S>(t.nq);

@@ -5,7 +5,8 @@
 #include "check.h"
 #include "collide/support_points.h"
 #include "dynamics/random_robots.h"
-#include "dynamics/tree_memory.h"
+#include "layout/ground_shapes.h"
+#include "layout/tree_memory.h"
 
 using namespace stickslip;
 
@@ -50,14 +51,14 @@ void on_random_robots(int robots, const F& f) {
   std::normal_distribution<double> normal;
   for (int r = 0; r < robots; ++r) {
     const ModelPtr model = random_shapes(rng);
-    dynamics::TreeMemory<S> memory(*model);
+    layout::TreeMemory<S> memory(*model);
     double w[4], square = 0;
     for (double& x : w) x = normal(rng), square += x * x;
     S quaternion[4], joints[3];
     for (int k = 0; k < 4; ++k) quaternion[k] = constant<S>(w[k] / std::sqrt(square));
     for (S& q : joints) q = constant<S>(normal(rng));
     dynamics::compute_positions(memory.tree(), quaternion, joints);
-    const auto shapes = collide::ground_shapes(*model, memory.layout());
+    const auto shapes = layout::ground_shapes(*model, memory.layout());
     CHECK(shapes.size() == 16);
     for (const collide::GroundShape& shape : shapes) {
       const collide::PlacedShape<S> placed = collide::place(memory.tree(), shape);
@@ -85,7 +86,7 @@ TEST(NoSupportPointIsBelowTheLowestPointOfItsShape) {
 TEST(TheLowestPointIsThatOfASupportPointButForCylinders) {
   on_random_robots<double>(50, [](const collide::GroundShape& shape, double bound, double lowest) {
     // A cylinder is bounded by the capsule around it, which is at most a radius longer at each end.
-    const double slack = shape.type == ShapeType::kCylinder ? shape.half[0] : 0;
+    const double slack = shape.type == collide::GroundShapeType::kCylinder ? shape.half[0] : 0;
     CHECK(bound >= lowest - slack - 1e-14);
   });
 }

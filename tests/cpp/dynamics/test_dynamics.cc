@@ -9,7 +9,7 @@
 #include "dynamics/dynamics.h"
 #include "dynamics/mass_matrix.h"
 #include "dynamics/random_robots.h"
-#include "dynamics/tree_memory.h"
+#include "layout/tree_memory.h"
 
 using namespace stickslip;
 using namespace stickslip::dynamics;
@@ -20,7 +20,7 @@ namespace {
 template <class S>
 struct Robots {
   using W = Wide<S>;
-  TreeMemory<S> memory;
+  layout::TreeMemory<S> memory;
   Tree<S>& t;
   std::vector<Spatial<W>> wrenches;
   std::vector<S> q, rates, extra, joints;
@@ -55,7 +55,7 @@ template <class S>
 std::vector<S> run_kernels(const Model& model, const std::vector<std::vector<double>>& states) {
   Robots<S> r(model, states);
   Tree<S>& t = r.t;
-  TreeMemory<S>& memory = r.memory;
+  layout::TreeMemory<S>& memory = r.memory;
   std::vector<S> out;
   compute_positions(t, r.quaternion, r.q.data());
   compute_inertias(t);
@@ -204,7 +204,7 @@ void compare_inertias() {
     for (auto& c : wrong) c.inertial = {};
     given.t.constants = wrong.data();
     std::vector<LinkInertia<Wide<S>>> inertias(given.t.num_slots);
-    const TreeLayout& layout = given.memory.layout();
+    const layout::TreeLayout& layout = given.memory.layout();
     for (int slot = 0; slot < given.t.num_slots; ++slot)
       for (int lane = 0; lane < ScalarTraits<Wide<S>>::kWidth; ++lane) {
         const int body = layout.slots[slot].joint[Tree<S>::kLanes == 1 ? 0 : lane] + 1;
@@ -371,7 +371,7 @@ TEST(RotorsFeelNothingOfHowTheirCentripetalForceIsRounded) {
   joint.pose.position = {1, -2, 0.5};
   builder.add_joint(joint);
   const ModelPtr model = builder.build(BaseType::kFloating);
-  TreeMemory<double> memory(*model);
+  layout::TreeMemory<double> memory(*model);
   Tree<double>& t = memory.tree();
   const auto state = random_state(*model, 8);
   compute_positions(t, state.data(), state.data() + 7);
@@ -384,7 +384,7 @@ TEST(RotorsFeelNothingOfHowTheirCentripetalForceIsRounded) {
 
 TEST(FactorReproducesTheMassMatrix) {
   for (const ModelPtr& model : robots()) {
-    TreeMemory<double> memory(*model);
+    layout::TreeMemory<double> memory(*model);
     Tree<double>& t = memory.tree();
     const auto s = random_state(*model, 5);
     const int n = model->num_joints(), nu = model->nu(), offset = nu - n;
@@ -423,7 +423,7 @@ TEST(FactorReproducesTheMassMatrix) {
 
 TEST(SolvesInvertTheMassMatrix) {
   for (const ModelPtr& model : robots()) {
-    TreeMemory<double> memory(*model);
+    layout::TreeMemory<double> memory(*model);
     Tree<double>& t = memory.tree();
     const auto s = random_state(*model, 6);
     const int n = model->num_joints(), nu = model->nu(), offset = nu - n;

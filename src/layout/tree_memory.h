@@ -4,18 +4,18 @@
 #include <vector>
 
 #include "dynamics/tree.h"
-#include "dynamics/tree_layout.h"
+#include "layout/tree_layout.h"
 
-namespace stickslip::dynamics {
+namespace stickslip::layout {
 
 template <class S>
 class TreeMemory {
  public:
   explicit TreeMemory(const Model& model)
-      : layout_(model, BundleScalar<S>::kLanes),
+      : layout_(model, dynamics::BundleScalar<S>::kLanes),
         constants_(layout_.num_slots),
         links_(layout_.num_slots) {
-    write_constants(layout_, BundleScalar<S>::kLanes,
+    write_constants(layout_, dynamics::BundleScalar<S>::kLanes,
                     reinterpret_cast<Value<S>*>(constants_.data()));
     tree_.floating = layout_.floating;
     tree_.num_bundles = static_cast<int>(layout_.bundles.size());
@@ -34,14 +34,14 @@ class TreeMemory {
   TreeMemory(const TreeMemory&) = delete;
   TreeMemory& operator=(const TreeMemory&) = delete;
 
-  Tree<S>& tree() { return tree_; }
+  dynamics::Tree<S>& tree() { return tree_; }
   const TreeLayout& layout() const { return layout_; }
 
  private:
   TreeLayout layout_;
-  std::vector<LinkConstants<WideConstant<S>>> constants_;
-  std::vector<LinkState<Wide<S>>> links_;
-  Tree<S> tree_;
+  std::vector<dynamics::LinkConstants<dynamics::WideConstant<S>>> constants_;
+  std::vector<dynamics::LinkState<dynamics::Wide<S>>> links_;
+  dynamics::Tree<S> tree_;
 };
 
-}  // namespace stickslip::dynamics
+}  // namespace stickslip::layout

@@ -4,19 +4,19 @@
 
 #include "contact/single.h"
 
-namespace stickslip::contact::inline STICKSLIP_KERNELS {
+namespace stickslip::solvers {
 
-inline Method method_of(SingleContactMethod method) {
+inline contact::Method method_of(SingleContactMethod method) {
   switch (method) {
     case SingleContactMethod::kBisection:
-      return Method::kBisection;
+      return contact::Method::kBisection;
     case SingleContactMethod::kGoldenSection:
-      return Method::kGoldenSection;
+      return contact::Method::kGoldenSection;
     case SingleContactMethod::kQuartic:
-      return Method::kQuartic;
+      return contact::Method::kQuartic;
     default:
-      return Method::kHalley;
+      return contact::Method::kHalley;
   }
 }
 
-}  // namespace stickslip::contact::inline STICKSLIP_KERNELS
+}  // namespace stickslip::solvers

@@ -1,14 +1,12 @@
-// Makes the bundles of branches (branches.h) of a Model, once per model. Host side: the kernels see
-// only what it fills.
+// Makes the bundles of branches (dynamics/branches.h) of a Model, once per model.
 #pragma once
 #include <stickslip/model.h>
 
 #include <vector>
 
 #include "dynamics/branches.h"
-#include "spatial/vec3.h"
 
-namespace stickslip::dynamics {
+namespace stickslip::layout {
 
 /// The layout of a Model for kernels with up to `lanes_per_bundle` branches side by side. Double;
 /// made once per model.
@@ -18,23 +16,23 @@ struct TreeLayout {
   bool floating;
   int num_joints;
   int num_slots;
-  std::vector<Bundle> bundles;  // parents before children
-  std::vector<Slot> slots;
-  std::vector<LinkIndex> link_of_body;
-  std::vector<int> parent_joint;             // of each joint; -1 on the base
-  std::vector<Matrix3> turn;                 // per body: turned link frame in the body frame
-  std::vector<LinkConstants<double>> links;  // [slot * kMaxLanes + lane]
-  Inertial base;                             // of body 0 (zero for a fixed base)
+  std::vector<dynamics::Bundle> bundles;  // parents before children
+  std::vector<dynamics::Slot> slots;
+  std::vector<dynamics::LinkIndex> link_of_body;
+  std::vector<int> parent_joint;  // of each joint; -1 on the base
+  std::vector<Matrix3> turn;      // per body: turned link frame in the body frame
+  std::vector<dynamics::LinkConstants<double>> links;  // [slot * dynamics::kMaxLanes + lane]
+  Inertial base;                                       // of body 0 (zero for a fixed base)
 
   /// A point of a body, in its turned link frame.
   Vector3 turned(int body, const Vector3& p) const;
   /// Mass properties of a body, given in its body frame as a Model does, in its turned link frame.
   /// Exact where the joint's axis is a coordinate axis.
-  LinkInertia<double> turned_inertia(int body, const Inertial& inertial) const;
+  dynamics::LinkInertia<double> turned_inertia(int body, const Inertial& inertial) const;
 };
 
 /// Numbers per slot of `write_constants`, for each lane of a bundle.
-inline constexpr int kConstantsPerSlot = sizeof(LinkConstants<double>) / sizeof(double);
+inline constexpr int kConstantsPerSlot = sizeof(dynamics::LinkConstants<double>) / sizeof(double);
 
 /// The constants of a layout as kernels with so many lanes per bundle read them: T (slots,
 /// kConstantsPerSlot, lanes), which is LinkConstants of each slot.
@@ -43,9 +41,9 @@ void write_constants(const TreeLayout& layout, int lanes, T* out) {
   for (int slot = 0; slot < layout.num_slots; ++slot)
     for (int k = 0; k < kConstantsPerSlot; ++k)
       for (int lane = 0; lane < lanes; ++lane) {
-        const auto& link = layout.links[slot * kMaxLanes + lane];
+        const auto& link = layout.links[slot * dynamics::kMaxLanes + lane];
         *out++ = static_cast<T>(reinterpret_cast<const double*>(&link)[k]);
       }
 }
 
-}  // namespace stickslip::dynamics
+}  // namespace stickslip::layout

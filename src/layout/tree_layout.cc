@@ -1,4 +1,4 @@
-#include "dynamics/tree_layout.h"
+#include "layout/tree_layout.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 
 #include "model/pose.h"
 
-namespace stickslip::dynamics {
+namespace stickslip::layout {
 namespace {
 
 /// A rotation whose third column is the axis. Coordinate axes give exact permutations: positive
@@ -86,15 +86,15 @@ TreeLayout::TreeLayout(const Model& model, int lanes_per_bundle)
   for (Chain& c : find_chains(model)) groups[{c.level, c.shape}].push_back(c);
   for (const auto& [key, chains] : groups)
     for (size_t first = 0; first < chains.size(); first += lanes_per_bundle) {
-      Bundle b{};
+      dynamics::Bundle b{};
       b.first_slot = num_slots;
       b.length = static_cast<int>(chains[first].joints.size());
       b.lanes = static_cast<int>(std::min<size_t>(lanes_per_bundle, chains.size() - first));
       b.on_base = true;
       for (int k = 0; k < b.length; ++k) {
-        Slot slot{};
+        dynamics::Slot slot{};
         slot.prismatic = key.second[k] == 'p';
-        for (int lane = 0; lane < kMaxLanes; ++lane) {
+        for (int lane = 0; lane < dynamics::kMaxLanes; ++lane) {
           const int j = chains[first + (lane < b.lanes ? lane : 0)].joints[k];
           slot.joint[lane] = j;
           slot.parent[lane] = link_of_body[model.joints()[j].parent_body];
@@ -102,12 +102,12 @@ TreeLayout::TreeLayout(const Model& model, int lanes_per_bundle)
         }
         slots.push_back(slot);
       }
-      for (int lane = 0; lane < kMaxLanes; ++lane) {
+      for (int lane = 0; lane < dynamics::kMaxLanes; ++lane) {
         const int parent = chains[first + (lane < b.lanes ? lane : 0)].parent_body;
         b.parent[lane] = link_of_body[parent];
         if (parent != 0) {
           b.on_base = false;
-          for (Bundle& above : bundles)  // a chain ends where others hang on it
+          for (dynamics::Bundle& above : bundles)  // a chain ends where others hang on it
             if (above.first_slot + above.length - 1 == b.parent[lane].slot)
               above.has_children = true;
         }
@@ -116,13 +116,13 @@ TreeLayout::TreeLayout(const Model& model, int lanes_per_bundle)
       bundles.push_back(b);
     }
 
-  links.resize(static_cast<size_t>(num_slots) * kMaxLanes);
+  links.resize(static_cast<size_t>(num_slots) * dynamics::kMaxLanes);
   for (int slot = 0; slot < num_slots; ++slot) {
-    for (int lane = 0; lane < kMaxLanes; ++lane) {
+    for (int lane = 0; lane < dynamics::kMaxLanes; ++lane) {
       const int j = slots[slot].joint[lane];
       const Joint& joint = model.joints()[j];
       const Inertial& in = model.bodies()[j + 1].inertial;
-      LinkConstants<double>& link = links[slot * kMaxLanes + lane];
+      dynamics::LinkConstants<double>& link = links[slot * dynamics::kMaxLanes + lane];
       const Matrix3 from_parent = transpose(turn[joint.parent_body]);
       const Matrix3 r = multiply(multiply(from_parent, joint.pose.rotation), turn[j + 1]);
       const Vector3 p = rotate(from_parent, joint.pose.position);
@@ -142,7 +142,7 @@ Vector3 TreeLayout::turned(int body, const Vector3& p) const {
   return rotate(transpose(turn[body]), p);
 }
 
-LinkInertia<double> TreeLayout::turned_inertia(int body, const Inertial& in) const {
+dynamics::LinkInertia<double> TreeLayout::turned_inertia(int body, const Inertial& in) const {
   const Vector3 c = turned(body, in.center_of_mass);
   const auto& i = in.inertia;
   const Matrix3 full{i[0], i[1], i[2], i[1], i[3], i[4], i[2], i[4], i[5]};
@@ -150,4 +150,4 @@ LinkInertia<double> TreeLayout::turned_inertia(int body, const Inertial& in) con
   return {in.mass, {c[0], c[1], c[2]}, {t[0], t[1], t[2], t[4], t[5], t[8]}};
 }
 
-}  // namespace stickslip::dynamics
+}  // namespace stickslip::layout

@@ -1,22 +1,21 @@
-// Collision shapes of a robot that may meet a horizontal plane, made once per model.
+// A collision shape as the kernels see it: its place on a link, its size, its support points.
 //
 // Each shape offers a fixed list of support points: a sphere one, a capsule two (spheres at its
 // ends), a box its eight corners, a cylinder four rim points per cap (lowest, highest and the two
 // between). Where they are: support_points.h.
 #pragma once
-#include <stickslip/model.h>
+#include "dynamics/branches.h"
 
-#include <vector>
-
-#include "dynamics/tree_layout.h"
-
+// Plain data, the same for every instruction set.
 namespace stickslip::collide {
 
-/// A shape in its turned link frame. Plain data, the same for every instruction set.
+enum class GroundShapeType { kSphere, kBox, kCapsule, kCylinder };
+
+/// A shape in its turned link frame.
 struct GroundShape {
   dynamics::LinkIndex link;
-  int body, shape;
-  ShapeType type;
+  int body, shape;  // of the model
+  GroundShapeType type;
   double center[3];
   double axes[9];          // row-major; columns: shape axes
   double half[3];          // box: half sides; capsule, cylinder: {radius, radius, half length}
@@ -24,14 +23,5 @@ struct GroundShape {
   double bounding_radius;  // of all of the shape about its center
   int first_point, num_points;
 };
-
-/// The shapes of a model that can meet the ground; meshes are left out (`unsupported_shapes` names
-/// them).
-std::vector<GroundShape> ground_shapes(const Model& model, const dynamics::TreeLayout& layout);
-
-/// Indices of shapes that no contact is computed for.
-std::vector<int> unsupported_shapes(const Model& model);
-
-int total_points(const std::vector<GroundShape>& shapes);
 
 }  // namespace stickslip::collide
