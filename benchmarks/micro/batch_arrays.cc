@@ -9,6 +9,7 @@
 #include <cstring>
 #include <ctime>
 #include <memory>
+#include <numeric>
 #include <vector>
 
 #include "lane/transpose.h"
@@ -37,7 +38,9 @@ double thread_seconds() {
 /// `n` numbers of a pack's environments, from or to an array of `envs` environments.
 void move(Layout layout, bool in, float* array, int n, long first, long envs, Lanes* lanes) {
   if (layout == Layout::kRows) {
-    in ? load_rows(array + first * n, n, lanes) : store_rows(lanes, n, array + first * n);
+    int rows[kWidth];
+    std::iota(rows, rows + kWidth, static_cast<int>(first));
+    in ? load_rows(array, rows, n, lanes) : store_rows(lanes, n, array, rows);
   } else {
     const long stride = layout == Layout::kColumns ? envs : kWidth;
     float* at = array + (layout == Layout::kColumns ? first : first * n);

@@ -94,13 +94,15 @@ void load_state(Batch& batch, const nb::bytes& blob) {
 }
 
 void init_batch(Batch* self, const World& world, int num_envs, const std::string& precision,
-                int num_threads, bool pin_threads, const std::string& instruction_set, int width) {
+                int num_threads, bool pin_threads, const std::string& instruction_set,
+                int regroup_every, int width) {
   BatchOptions options;
   options.num_envs = num_envs;
   options.precision = choice("dtype", precision, kPrecisions);
   options.num_threads = num_threads;
   options.pin_threads = pin_threads;
   options.instruction_set = instruction_set;
+  options.regroup_every = regroup_every;
   options.width = width;
   new (self) Batch(world, options);
 }
@@ -114,7 +116,7 @@ void bind_batch(nb::module_& m) {
       .def_ro("point", &ContactPoint::point);
   nb::class_<Batch>(m, "Batch")
       .def("__init__", &init_batch, "world"_a, "num_envs"_a, "precision"_a, "num_threads"_a,
-           "pin_threads"_a, "instruction_set"_a, "width"_a = 0)
+           "pin_threads"_a, "instruction_set"_a, "regroup_every"_a, "width"_a = 0)
       .def_prop_ro("model", &Batch::model_ptr)
       .def_prop_ro("num_envs", &Batch::num_envs)
       .def_prop_ro("precision", [](const Batch& b) { return word_for(b.precision(), kPrecisions); })

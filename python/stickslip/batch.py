@@ -48,6 +48,8 @@ class Batch(Profiled):
     num_threads: 0 for one per core that this process may use. pin_threads: bind each but the calling one
         to a core.
     instruction_set: "avx512", "avx2" or "neon"; None for what STICKSLIP_ISA says, else the widest that the machine has.
+    regroup_every: steps after which environments that touch the ground with the same points are brought together in packs;
+        0 for never. Shows in speed only.
 
     ValueError says what a batch cannot hold (no robot or several, a method other than "auto", ...) and what to do.
 
@@ -69,6 +71,7 @@ class Batch(Profiled):
         *,
         pin_threads: bool = False,
         instruction_set: str | None = None,
+        regroup_every: int = 16,
     ):
         if not isinstance(world, World):
             raise TypeError(f"world is a {type(world).__name__}; a stickslip.World is wanted")
@@ -84,6 +87,7 @@ class Batch(Profiled):
             num_threads=count("num_threads", num_threads),
             pin_threads=bool(pin_threads),
             instruction_set=instruction_set or "",
+            regroup_every=count("regroup_every", regroup_every),
         )
         self._model: Model = self._core.model
         self._num_envs: int = self._core.num_envs

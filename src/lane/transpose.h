@@ -1,4 +1,5 @@
-// Rows of numbers, one per environment, to lanes and back: out[k] holds number k of W rows.
+// Rows of numbers, one per environment, to lanes and back: out[k] holds number k of W rows, which
+// may lie anywhere in an array.
 //
 // Users' arrays are row-major (num_envs, n), so that NumPy, PyTorch and JAX share them as they are;
 // packs want lane-major. A block of W x W numbers is turned in registers, log2 W rounds of
@@ -40,18 +41,19 @@ STICKSLIP_INLINE void transpose_block(Pack<T, W> (&x)[W]) {
   }
 }
 
-/// out[k] = numbers k of W rows of n numbers. Up to W numbers behind the last row are read (and not
-/// used): arrays are padded.
+/// out[k] = numbers k of the rows `rows` (W) of an array (any, n). Up to W numbers behind the last
+/// row are read (and not used): arrays are padded.
 template <class S>
-STICKSLIP_INLINE void load_rows(const Value<S>* rows, int n, S* out) {
+STICKSLIP_INLINE void load_rows(const Value<S>* array, const int* rows, int n, S* out) {
   if constexpr (ScalarTraits<S>::kWidth == 1) {
-    for (int k = 0; k < n; ++k) out[k] = rows[k];
+    const Value<S>* row = array + long(rows[0]) * n;
+    for (int k = 0; k < n; ++k) out[k] = row[k];
   } else {
     constexpr int W = ScalarTraits<S>::kWidth;
     for (int first = 0; first < n; first += W) {
       S block[W];
       for (int i = 0; i < W; ++i)
-        __builtin_memcpy(&block[i], rows + long(i) * n + first, sizeof(S));
+        __builtin_memcpy(&block[i], array + long(rows[i]) * n + first, sizeof(S));
       transpose_block(block);
       const int count = n - first < W ? n - first : W;
       for (int k = 0; k < count; ++k) out[first + k] = block[k];
@@ -61,9 +63,10 @@ STICKSLIP_INLINE void load_rows(const Value<S>* rows, int n, S* out) {
 
 /// The way back.
 template <class S>
-STICKSLIP_INLINE void store_rows(const S* in, int n, Value<S>* rows) {
+STICKSLIP_INLINE void store_rows(const S* in, int n, Value<S>* array, const int* rows) {
   if constexpr (ScalarTraits<S>::kWidth == 1) {
-    for (int k = 0; k < n; ++k) rows[k] = in[k];
+    Value<S>* row = array + long(rows[0]) * n;
+    for (int k = 0; k < n; ++k) row[k] = in[k];
   } else {
     constexpr int W = ScalarTraits<S>::kWidth;
     for (int first = 0; first < n; first += W) {
@@ -73,10 +76,10 @@ STICKSLIP_INLINE void store_rows(const S* in, int n, Value<S>* rows) {
       transpose_block(block);
       if (count == W) {
         for (int i = 0; i < W; ++i)
-          __builtin_memcpy(rows + long(i) * n + first, &block[i], sizeof(S));
+          __builtin_memcpy(array + long(rows[i]) * n + first, &block[i], sizeof(S));
       } else {
         for (int i = 0; i < W; ++i)
-          __builtin_memcpy(rows + long(i) * n + first, &block[i], count * sizeof(Value<S>));
+          __builtin_memcpy(array + long(rows[i]) * n + first, &block[i], count * sizeof(Value<S>));
       }
     }
   }

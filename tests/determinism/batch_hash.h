@@ -16,17 +16,20 @@ struct How {
   int width = 0;
   int threads = 1;
   bool shuffled = false;  // environments in other places, beside other neighbors
+  int regroup_every = 16;
   bool reloaded = false;  // saved in the middle and gone on with in a new batch of another pack
 
   BatchOptions options(Precision precision) const {
     BatchOptions o = batch_options(kEnvs, precision, threads);
     o.instruction_set = instruction_set;
     o.width = width;
+    o.regroup_every = regroup_every;
     return o;
   }
   std::string text() const {
     return instruction_set + " width " + std::to_string(width) + ", " + std::to_string(threads) +
-           " threads" + (shuffled ? ", shuffled" : "") + (reloaded ? ", reloaded" : "");
+           " threads, regrouped every " + std::to_string(regroup_every) +
+           (shuffled ? ", shuffled" : "") + (reloaded ? ", reloaded" : "");
   }
 };
 
@@ -157,8 +160,8 @@ inline std::vector<state_hash::Entry> all(const ModelPtr& anymal) {
 inline std::vector<How> ways(Precision precision, bool threads) {
   std::vector<How> out;
   for (const PackShape& shape : pack_shapes(precision)) {
-    out.push_back({shape.instruction_set, shape.width});
-    out.push_back({shape.instruction_set, shape.width, 2, true, true});
+    out.push_back({shape.instruction_set, shape.width, 1, false, 0});
+    out.push_back({shape.instruction_set, shape.width, 2, true, 3, true});
   }
   const How narrowest = *std::min_element(
       out.begin(), out.end(), [](const How& a, const How& b) { return a.width < b.width; });

@@ -60,6 +60,8 @@ def test_worlds_that_a_batch_cannot_hold_are_named(make, says: str) -> None:
         ({"num_envs": 2**31}, ValueError, "num_envs is 2147483648; it must be at most"),
         ({"num_envs": 4.0}, TypeError, "num_envs is 4.0; an integer"),
         ({"num_envs": True}, TypeError, "num_envs is True"),
+        ({"regroup_every": -1}, ValueError, "regroup_every is -1; it must be zero or positive"),
+        ({"regroup_every": 1.5}, TypeError, "regroup_every is 1.5; an integer"),
         ({"num_threads": -1}, ValueError, "num_threads is -1"),
         ({"num_threads": 1.5}, TypeError, "num_threads is 1.5"),
         ({"dtype": "float16"}, ValueError, "dtype is 'float16'; choose one of 'float32', 'float64'"),

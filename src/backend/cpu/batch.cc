@@ -24,6 +24,9 @@ void check_options(const BatchOptions& o) {
   if (o.num_threads < 0 || o.num_threads > 1024)
     reject(": num_threads is " + std::to_string(o.num_threads) +
            "; it must be 0 (one per core) to 1024");
+  if (o.regroup_every < 0)
+    reject(": regroup_every is " + std::to_string(o.regroup_every) +
+           "; it must be 0 (never) or a number of steps");
 }
 
 }  // namespace
@@ -60,7 +63,7 @@ const std::vector<int>& Batch::contact_shapes() const { return impl_->shapes; }
 
 std::size_t Batch::memory_bytes() const {
   std::size_t sum = impl_->memory.bytes() + impl_->history_block.bytes() +
-                    impl_->constants.bytes() + impl_->bodies.bytes();
+                    impl_->constants.bytes() + impl_->bodies.bytes() + impl_->grouping.bytes();
   for (const auto& worker : impl_->workers) sum += worker->workspace.bytes();
   return sum;
 }

@@ -66,8 +66,9 @@ Batch::Impl::Impl(const World::Impl& world, const BatchOptions& o)
       history_rows(scene.tables()),
       settings(world.settings),
       padded(round_up(o.num_envs, kernels->width)),
+      grouping(o.num_envs, padded, kernels->width, o.regroup_every),
       memory(scene.tables(), o.precision, o.num_envs, padded),
-      bodies(*model, layout, *kernels, padded),
+      bodies(*model, layout, *kernels, grouping, padded),
       pool(thread_count(o, padded / kernels->width), o.pin_threads) {
   settings.clock = nullptr;
   fill_pack_scene();
@@ -150,13 +151,17 @@ void Batch::Impl::fill_start(const world::RobotData& robot) {
   for (long env = 0; env < padded; ++env) reset(env, start_q.data(), start_u.data());
 }
 
+long Batch::Impl::history_at(long env, int row) const {
+  const long place = grouping.place(env), w = kernels->width;
+  return (place / w * history_rows.numbers + row) * w + place % w;
+}
 double Batch::Impl::history(long env, int row) const {
-  const long w = kernels->width, at = (env / w * history_rows.numbers + row) * w + env % w;
-  return backend::get_number(history_block.data(), memory.type(BatchField::kQ), at);
+  return backend::get_number(history_block.data(), memory.type(BatchField::kQ),
+                             history_at(env, row));
 }
 void Batch::Impl::set_history(long env, int row, double value) {
-  const long w = kernels->width, at = (env / w * history_rows.numbers + row) * w + env % w;
-  backend::set_number(history_block.data(), memory.type(BatchField::kQ), at, value);
+  backend::set_number(history_block.data(), memory.type(BatchField::kQ), history_at(env, row),
+                      value);
 }
 
 void Batch::Impl::reset(long env, const double* q, const double* u) {
@@ -194,6 +199,7 @@ backend::EnvArrays Batch::Impl::env_arrays() {
     return {optional ? nullptr : memory.shared_row(f), false};
   };
   backend::EnvArrays a{};
+  a.order = grouping.order();
   a.q = memory.data(kQ);
   a.u = memory.data(kU);
   a.generalized_force = memory.data(kGeneralizedForce);
@@ -227,12 +233,31 @@ void Batch::Impl::step_pack(void* self, int thread, long pack) {
   if (bits) b.bits_.fetch_or(bits, std::memory_order_relaxed);
 }
 
+void Batch::Impl::regroup_block(void* self, int, long block) {
+  Impl& b = *static_cast<Impl*>(self);
+  const auto bodies = b.bodies.carried();
+  const backend::LaneRows carried[] = {
+      {b.history_block.data(), b.history_rows.numbers,
+       static_cast<int>(backend::size_of(b.memory.type(BatchField::kQ)))},
+      bodies[0],
+      bodies[1]};
+  b.grouping.regroup(block, b.running_.contact_active, b.scene.tables().num_points,
+                     {carried, b.bodies.used() ? 3u : 1u});
+}
+
 std::uint32_t Batch::Impl::step(int steps, bool continues) {
   running_ = env_arrays();
   running_.continues = continues;
-  running_steps_ = steps;
   bits_ = 0;
-  pool.run(padded / kernels->width, {&Impl::step_pack, this});
+  for (int done = 0; done < steps; done += running_steps_, running_.continues = true) {
+    if (grouping.due()) {
+      pool.run(grouping.blocks(), {&Impl::regroup_block, this});
+      grouping.restart();
+    }
+    running_steps_ = grouping.part_of(steps - done);
+    pool.run(padded / kernels->width, {&Impl::step_pack, this});
+    grouping.count(running_steps_);
+  }
   if (workers[0]->settings.clock) profiled_steps += static_cast<long>(steps) * options.num_envs;
   return bits_;
 }

@@ -6,6 +6,7 @@
 
 #include "backend/cpu/batch_memory.h"
 #include "backend/cpu/body_parameters.h"
+#include "backend/cpu/grouping.h"
 #include "backend/cpu/instruction_sets.h"
 #include "backend/cpu/thread_pool.h"
 #include "layout/tree_layout.h"
@@ -45,6 +46,7 @@ struct Batch::Impl {
   backend::EnvArrays env_arrays();
   void reset(long env, const double* q, const double* u);
   /// Number `row` of what an environment carries besides q and u (PackHistory).
+  long history_at(long env, int row) const;
   double history(long env, int row) const;
   void set_history(long env, int row, double value);
 
@@ -64,6 +66,7 @@ struct Batch::Impl {
   backend::PackHistory history_rows;
   step::StepSettings settings;
   long padded;
+  backend::Grouping grouping;
   backend::BatchMemory memory;
   world::AlignedBlock history_block;
   backend::BodyParameters bodies;
@@ -87,6 +90,7 @@ struct Batch::Impl {
   backend::EnvArrays running_;
   int running_steps_ = 0;
   std::atomic<std::uint32_t> bits_{0};
+  static void regroup_block(void* self, int thread, long block);
   static void step_pack(void* self, int thread, long pack);
 };
 

@@ -32,7 +32,8 @@ void BodyParameters::allocate(BatchMemory& memory) {
 }
 
 void BodyParameters::refresh(BatchMemory& memory, long pack) {
-  for (long env = pack * kernels_.width; env < (pack + 1) * kernels_.width; ++env) {
+  for (long place = pack * kernels_.width; place < (pack + 1) * kernels_.width; ++place) {
+    const long env = grouping_.order()[place];
     std::size_t row = 0;
     for (const BatchField f : kFields) row += memory.row(f) * number_bytes();
     char* seen = seen_.data() + env * row;
@@ -86,18 +87,18 @@ void BodyParameters::turn(BatchMemory& memory, long env) {
 void BodyParameters::put_link(long env, int slot, int lane,
                               const dynamics::LinkInertia<double>& inertia) {
   const NumberType type = kernels_.single ? NumberType::kFloat32 : NumberType::kFloat64;
-  const long link = env / kernels_.width * layout_.num_slots + slot;
-  const long place = kernels_.width > 1 ? env % kernels_.width : lane;
+  const long place = grouping_.place(env), w = kernels_.width;
+  const long link = place / w * layout_.num_slots + slot;
   for (int k = 0; k < kNumbers; ++k)
-    set_number(links_.data(), type, (link * kNumbers + k) * lanes() + place,
+    set_number(links_.data(), type, (link * kNumbers + k) * lanes() + (w > 1 ? place % w : lane),
                reinterpret_cast<const double*>(&inertia)[k]);
 }
 
 void BodyParameters::put_base(long env, const dynamics::LinkInertia<double>& inertia) {
   const NumberType type = kernels_.single ? NumberType::kFloat32 : NumberType::kFloat64;
-  const long w = kernels_.width;
+  const long place = grouping_.place(env), w = kernels_.width;
   for (int k = 0; k < kNumbers; ++k)
-    set_number(base_.data(), type, (env / w * kNumbers + k) * w + env % w,
+    set_number(base_.data(), type, (place / w * kNumbers + k) * w + place % w,
                reinterpret_cast<const double*>(&inertia)[k]);
 }
 

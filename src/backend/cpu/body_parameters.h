@@ -3,6 +3,7 @@
 // what has changed is turned before the pack is stepped, in double like a model's.
 #pragma once
 #include "backend/cpu/batch_memory.h"
+#include "backend/cpu/grouping.h"
 #include "backend/cpu/pack_kernels.h"
 #include "layout/tree_layout.h"
 
@@ -11,8 +12,8 @@ namespace stickslip::backend {
 class BodyParameters {
  public:
   BodyParameters(const Model& model, const layout::TreeLayout& layout, const PackKernels& kernels,
-                 long padded)
-      : model_(model), layout_(layout), kernels_(kernels), padded_(padded) {}
+                 const Grouping& grouping, long padded)
+      : model_(model), layout_(layout), kernels_(kernels), grouping_(grouping), padded_(padded) {}
 
   bool used() const { return bool(links_); }
   /// Memory for all environments, filled with the model's.
@@ -22,6 +23,11 @@ class BodyParameters {
   /// LinkInertia of slots and of body 0, for a pack: see EnvArrays.
   const void* links(long pack) const;
   const void* base(long pack) const;
+  /// What moves with an environment, (slots and body 0): see Grouping::regroup.
+  std::array<LaneRows, 2> carried() {
+    return {LaneRows{links_.data(), long{layout_.num_slots} * kNumbers, number_bytes()},
+            LaneRows{base_.data(), kNumbers, number_bytes()}};
+  }
   std::size_t bytes() const { return links_.bytes() + base_.bytes() + seen_.bytes(); }
 
  private:
@@ -39,6 +45,7 @@ class BodyParameters {
   const Model& model_;
   const layout::TreeLayout& layout_;
   const PackKernels& kernels_;
+  const Grouping& grouping_;
   long padded_;
   world::AlignedBlock links_, base_;
   world::AlignedBlock seen_;  // the users' rows as they were turned last

@@ -28,6 +28,7 @@ struct Parameter {
 
 /// The arrays of a batch: T unless said, (environments, ...) row-major, padded to whole packs.
 struct EnvArrays {
+  const int* order;  // (places) the environment at each, see Grouping
   void *q, *u, *generalized_force, *pd_target, *contact_impulse, *residual;
   Flag* contact_active;
   StatusBits* status;
@@ -73,8 +74,9 @@ struct PackKernels {
   long (*workspace_bytes)(const PackScene&);
   /// Lays a workspace out; aligned to 64.
   void (*prepare)(void* workspace, const PackScene&);
-  /// Steps the environments of a pack; `first` is a multiple of the width. The same workspace may
-  /// serve any pack. Returns the status bits of its environments below `num_envs`, or-ed.
+  /// Steps the environments at places first .. first + width - 1; `first` is a multiple of the
+  /// width. The same workspace may serve any pack. Returns their status bits, or-ed, those at
+  /// places beyond `num_envs` left out.
   StatusBits (*step)(void* workspace, const EnvArrays&, const PackInertias&,
                      const step::StepSettings&, long first, long num_envs, int steps);
 };

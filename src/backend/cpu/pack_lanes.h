@@ -17,9 +17,9 @@ class PackLanes {
   void lay_out(contact::Arena& arena, const PackScene& scene);
   step::RobotLanes<S>& robot() { return robot_; }
 
-  /// Takes environments first .. first + width - 1. A state that was written since the last step
-  /// starts afresh; one that is not a state (NaN, no unit quaternion) is set aside. Lanes beyond
-  /// num_envs repeat the last environment.
+  /// Takes the environments at places first .. first + width - 1. A state that was written since
+  /// the last step starts afresh; one that is not a state (NaN, no unit quaternion) is set aside.
+  /// Lanes beyond num_envs repeat the last environment.
   void load(const EnvArrays& arrays, long first, long num_envs);
   void use_inertias(const PackInertias& inertias);
   /// Before each step of the robot: whether `store` will ask for its contacts.
@@ -34,16 +34,21 @@ class PackLanes {
 
  private:
   void lay_out_tree(contact::Arena& arena, const PackScene& scene);
-  void load_control(const EnvArrays& arrays, long first);
-  void load_parameter(const Parameter& p, int n, long first, S* out);
-  void load_wrenches(const EnvArrays& arrays, long first);
+  void load_control(const EnvArrays& arrays);
+  void load_parameter(const Parameter& p, int n, S* out);
+  void load_wrenches(const EnvArrays& arrays);
   void check_state();
   /// Lanes without an environment become copies of the last one that has one.
   void repeat(S* values, int n) const {
     for (int lane = used_; lane < kWidth; ++lane)
       for (int k = 0; k < n; ++k) set_lane(values[k], lane, get_lane(values[k], used_ - 1));
   }
-  T* rows(void* data, int n, long first) const { return static_cast<T*>(data) + first * n; }
+  void load_field(const void* data, int n, S* out) const {
+    load_rows(static_cast<const T*>(data), envs_, n, out);
+  }
+  void store_field(const S* in, int n, void* data) const {
+    store_rows(in, n, static_cast<T*>(data), envs_);
+  }
   S* history(const EnvArrays& arrays, long first, int row) const {
     const PackHistory h(*scene_.tables);
     return static_cast<S*>(arrays.history) + first / kWidth * h.numbers + row;
@@ -60,6 +65,7 @@ class PackLanes {
   Mask<S> set_aside_, fresh_, unconverged_, non_finite_;
   S residual_, steps_failed_;
   long steps_ = 0;
+  const int* envs_;    // of the lanes
   int used_ = kWidth;  // lanes with an environment
 };
 
@@ -107,23 +113,23 @@ void PackLanes<S>::lay_out_tree(contact::Arena& arena, const PackScene& scene) {
 }
 
 template <class S>
-void PackLanes<S>::load_parameter(const Parameter& p, int n, long first, S* out) {
-  const T* data = static_cast<const T*>(p.data);
+void PackLanes<S>::load_parameter(const Parameter& p, int n, S* out) {
   if (p.per_env)
-    load_rows(data + first * n, n, out);
+    load_field(p.data, n, out);
   else
-    for (int k = 0; k < n; ++k) out[k] = S(data[k]);
+    for (int k = 0; k < n; ++k) out[k] = S(static_cast<const T*>(p.data)[k]);
   repeat(out, n);
 }
 
 template <class S>
 void PackLanes<S>::load(const EnvArrays& arrays, long first, long num_envs) {
+  envs_ = arrays.order + first;
   used_ = first + kWidth <= num_envs ? kWidth : int(num_envs - first);
   const step::RobotTables& t = *scene_.tables;
   const PackHistory h(t);
   step::LaneState<S>& s = robot_.state;
-  load_rows(rows(arrays.q, t.nq, first), t.nq, s.q);
-  load_rows(rows(arrays.u, t.nu, first), t.nu, s.u);
+  load_field(arrays.q, t.nq, s.q);
+  load_field(arrays.u, t.nu, s.u);
   const S* past = history(arrays, first, 0);
   step::copy(past + h.q, t.nq, last_q_);
   step::copy(past + h.u, t.nu, last_u_);
@@ -139,7 +145,7 @@ void PackLanes<S>::load(const EnvArrays& arrays, long first, long num_envs) {
   s.fresh = fresh > constant<S>(0.5);
   check_state();
   fresh_ = s.fresh;
-  load_control(arrays, first);
+  load_control(arrays);
   if (arrays.continues) {
     S aside = past[h.aside];
     repeat(&aside, 1);
@@ -187,18 +193,18 @@ void PackLanes<S>::check_state() {
 }
 
 template <class S>
-void PackLanes<S>::load_control(const EnvArrays& arrays, long first) {
+void PackLanes<S>::load_control(const EnvArrays& arrays) {
   const step::RobotTables& t = *scene_.tables;
   step::LaneControl<S>& c = robot_.control;
   const S zero = constant<S>(0);
-  load_parameter(arrays.kp, t.num_joints, first, kp_);
-  load_parameter(arrays.kd, t.num_joints, first, damping_);  // kd so far
-  load_parameter(arrays.friction, t.num_shapes, first, friction_);
-  load_parameter(arrays.gravity, 3, first, gravity_);
+  load_parameter(arrays.kp, t.num_joints, kp_);
+  load_parameter(arrays.kd, t.num_joints, damping_);  // kd so far
+  load_parameter(arrays.friction, t.num_shapes, friction_);
+  load_parameter(arrays.gravity, 3, gravity_);
   // Whatever else is not finite shows in the velocities; a friction that is none would only open
   // the contacts.
   for (int k = 0; k < t.num_shapes; ++k) set_aside_ = set_aside_ | !(friction_[k] >= zero);
-  load_rows(rows(arrays.pd_target, t.num_joints, first), t.num_joints, target_);
+  load_field(arrays.pd_target, t.num_joints, target_);
   repeat(target_, t.num_joints);
   // Else a target that is none would count or not, by whether a neighbor is driven.
   for (int j = 0; j < t.num_joints; ++j) set_aside_ = set_aside_ | !step::is_finite(target_[j]);
@@ -209,14 +215,14 @@ void PackLanes<S>::load_control(const EnvArrays& arrays, long first) {
   if (t.damped)
     for (int j = 0; j < t.num_joints; ++j) damping_[j] = damping_[j] + constant<S>(t.damping[j]);
   if (arrays.force) {
-    load_rows(rows(arrays.generalized_force, t.nu, first), t.nu, force_);
+    load_field(arrays.generalized_force, t.nu, force_);
     repeat(force_, t.nu);
     for (int k = 0; k < t.nu; ++k) forces = forces | some(force_[k]);
     for (int k = 0; k < robot_.offset(); ++k) on_base = on_base | some(force_[k]);
   } else {
     for (int k = 0; k < t.nu; ++k) force_[k] = zero;
   }
-  load_wrenches(arrays, first);
+  load_wrenches(arrays);
   if (c.wrenches) {
     // What pulls at a fixed base moves nothing.
     for (int k = t.floating ? 0 : 6; k < 6 * t.num_bodies; ++k) pushed = pushed | some(scratch_[k]);
@@ -243,12 +249,12 @@ void PackLanes<S>::use_inertias(const PackInertias& inertias) {
 
 /// Wrenches (bodies, 6), force and torque, to the slots of the tree.
 template <class S>
-void PackLanes<S>::load_wrenches(const EnvArrays& arrays, long first) {
+void PackLanes<S>::load_wrenches(const EnvArrays& arrays) {
   step::LaneControl<S>& c = robot_.control;
   c.base_wrench = nullptr, c.wrenches = nullptr;
   if (!arrays.external_wrench.data) return;
   const step::RobotTables& t = *scene_.tables;
-  load_parameter(arrays.external_wrench, 6 * t.num_bodies, first, scratch_);
+  load_parameter(arrays.external_wrench, 6 * t.num_bodies, scratch_);
   for (int slot = 0; slot < t.num_slots; ++slot)
     wrenches_[slot] = zero_spatial<dynamics::Wide<S>>();
   for (int body = 0; body < t.num_bodies; ++body) {
@@ -303,8 +309,8 @@ StatusBits PackLanes<S>::store(const EnvArrays& arrays, const step::StepSettings
     s.fresh = (s.fresh & !set_aside_) | (set_aside_ & fresh_);
     step::record_contacts(robot_, set_aside_, true);
   }
-  store_rows(s.q, t.nq, rows(arrays.q, t.nq, first));
-  store_rows(s.u, t.nu, rows(arrays.u, t.nu, first));
+  store_field(s.q, t.nq, arrays.q);
+  store_field(s.u, t.nu, arrays.u);
   step::copy(s.q, t.nq, past + h.q);
   step::copy(s.u, t.nu, past + h.u);
   step::copy(s.impulse, 3 * t.num_points, past + h.impulse);
@@ -314,28 +320,32 @@ StatusBits PackLanes<S>::store(const EnvArrays& arrays, const step::StepSettings
   past[h.fresh] = select(s.fresh, one, zero);
   past[h.aside] = select(set_aside_, one, zero);
 
-  store_rows(contacts_.impulse, 3 * t.num_points,
-             rows(arrays.contact_impulse, 3 * t.num_points, first));
-  Flag* active = arrays.contact_active + first * t.num_points;
-  for (int k = 0; k < t.num_points; ++k)
-    for (int lane = 0; lane < kWidth; ++lane)
-      active[long(lane) * t.num_points + k] = get_lane(contacts_.active[k], lane);
+  store_field(contacts_.impulse, 3 * t.num_points, arrays.contact_impulse);
+  const Mask<S>* active = contacts_.active;
+  const int points = t.num_points;
+  for (int lane = 0; lane < kWidth; ++lane) {
+    Flag* flags = arrays.contact_active + long(envs_[lane]) * points;
+    for (int k = 0; k < points; ++k) flags[k] = get_lane(active[k], lane);
+  }
 
   const Mask<S> non_finite = non_finite_ | set_aside_, unconverged = unconverged_ & !set_aside_;
   StatusBits bits = 0;
   for (int lane = 0; lane < kWidth; ++lane) {
     const bool dropped = get_lane(set_aside_, lane);
-    StatusBits& status = arrays.status[first + lane];
+    const int env = envs_[lane];
+    StatusBits& status = arrays.status[env];
     if (!arrays.continues) status = 0;
     status |= (get_lane(unconverged, lane) ? 1u : 0u) | (get_lane(non_finite, lane) ? 2u : 0u);
     if (first + lane < num_envs) bits |= status;
-    T& residual = static_cast<T*>(arrays.residual)[first + lane];
+    T& residual = static_cast<T*>(arrays.residual)[env];
     const T before = arrays.continues ? residual : T(0);
     const T now = dropped ? T(0) : get_lane(residual_, lane);
     residual = now > before ? now : before;
     // Step by step, as a world counts.
     const long done = dropped ? 0 : steps_ - long(get_lane(steps_failed_, lane));
-    for (long k = 0; k < done; ++k) arrays.time[first + lane] += settings.time_step;
+    double time = arrays.time[env];
+    for (long k = 0; k < done; ++k) time += settings.time_step;
+    arrays.time[env] = time;
   }
   return bits;
 }
