@@ -58,3 +58,8 @@ TEST(LanesEndWhereThePlainScalarDoes) {
   compare_solves<Pack<double, 4>>(8, false);
   compare_solves<Pack<float, 8>>(9, false);
 }
+
+TEST(LanesOfTheWidestPacksDoToo) {
+  compare_solves<Pack<double, 8>>(10, true);
+  compare_solves<Pack<float, 16>>(11, false);
+}
