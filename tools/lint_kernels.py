@@ -52,12 +52,12 @@ def without_comments(text: str) -> str:
     def blank(match: re.Match[str]) -> str:
         return re.sub(r"[^\n]", " ", match[0])
 
-    return re.sub(r"//[^\n]*|/\*.*?\*/|(?<!include )\"(?:\\.|[^\"\\\n])*\"", blank, text, flags=re.S)
+    return re.sub(r"//[^\n]*|/\*.*?\*/|\"(?:\\.|[^\"\\\n])*\"", blank, text, flags=re.S)
 
 
 def is_kernel(name: str) -> bool:
     """Of a path below src, as an #include spells it."""
-    return name.split("/")[0] in KERNEL_FOLDERS or name in KERNEL_FILES
+    return ".." not in name and (name.split("/")[0] in KERNEL_FOLDERS or name in KERNEL_FILES)
 
 
 def findings(path: Path, name: str) -> list[str]:
@@ -65,10 +65,12 @@ def findings(path: Path, name: str) -> list[str]:
     kernel = is_kernel(name)
     rules = EVERYWHERE + (KERNEL if kernel else []) + ([] if name in LIBRARY_FILES else NO_LIBRARY)
     result = []
-    for number, line in enumerate(without_comments(path.read_text(encoding="utf-8")).splitlines(), 1):
+    text = path.read_text(encoding="utf-8")
+    for number, line in enumerate(text.splitlines() if kernel else [], 1):
         include = re.match(r"\s*#\s*include\s*[<\"]([^>\"]+)", line)
-        if kernel and include and not is_kernel(include[1]) and include[1] not in INTRINSICS.get(name, ()):
+        if include and not is_kernel(include[1]) and include[1] not in INTRINSICS.get(name, ()):
             result.append(f"{path}:{number}: #include {include[1]} (kernels include only kernels)")
+    for number, line in enumerate(without_comments(text).splitlines(), 1):
         for pattern, why in rules:
             if found := re.search(pattern, line):
                 result.append(f"{path}:{number}: {found[0].strip()} ({why})")

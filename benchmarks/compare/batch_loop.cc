@@ -28,6 +28,7 @@ Batch BatchEngine<T>::make(const Scenario& s, const EngineChoice& choice, int nu
   options.precision = choice.precision;
   options.num_threads = std::max(1, choice.threads);
   options.instruction_set = choice.instruction_set;
+  if (!choice.regroups) options.regroup_every = 0;
   return Batch(world, options);
 }
 

@@ -15,7 +15,7 @@ constexpr double kFloat64Share = 0.5, kAvx2Share = 0.6, kEnergySafeShare = 0.5;
   throw std::invalid_argument(
       "unknown engine '" + name +
       "'; there are mujoco, semi_implicit, energy_safe and "
-      "batch_<float32|float64>[_energy_safe][_avx2|_avx512|_neon][_threads<N>]");
+      "batch_<float32|float64>[_energy_safe][_avx2|_avx512|_neon][_ungrouped][_threads<N>]");
 }
 
 }  // namespace
@@ -46,6 +46,7 @@ EngineChoice engine_choice(const std::string& name) {
   if (take("_energy_safe")) e.integrator = Integrator::kEnergySafe;
   for (const char* set : {"avx2", "avx512", "neon"})
     if (e.instruction_set.empty() && take(std::string("_") + set)) e.instruction_set = set;
+  e.regroups = !take("_ungrouped");
   const std::string threads = "_threads";
   if (rest.starts_with(threads)) {
     const std::string digits = rest.substr(threads.size());

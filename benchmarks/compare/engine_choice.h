@@ -12,7 +12,8 @@ namespace stickslip::benchmarks {
 
 enum class EngineKind { kMujoco, kWorld, kBatch };
 
-/// batch_<float32|float64>[_energy_safe][_<instruction set>][_threads<N>]. With _threads the batch
+/// batch_<float32|float64>[_energy_safe][_<instruction set>][_ungrouped][_threads<N>]. Ungrouped:
+/// environments stay in the packs that they are put into. With _threads the batch
 /// is large and the wall clock counts, also for one thread: that one is what others are compared
 /// with.
 struct EngineChoice {
@@ -22,6 +23,7 @@ struct EngineChoice {
   Precision precision = Precision::kFloat64;
   std::string instruction_set;  ///< empty: the widest that the machine has
   int threads = 0;              ///< 0: one, without the suffix
+  bool regroups = true;
 
   bool wall_clock() const { return threads > 0; }
   /// A contact is solved when its residual is at most this [m/s].

@@ -28,8 +28,9 @@ struct BatchOptions {
   bool pin_threads = false;
   /// "avx512", "avx2", "neon"; empty: what STICKSLIP_ISA says, else the widest the machine has.
   std::string instruction_set;
-  /// Steps after which environments that touch the ground with the same points are brought
-  /// together in packs, again and again; 0: never. Shows in speed only. >= 0.
+  /// Steps, at least, after which environments that touch the ground with the same points are
+  /// brought together in packs; up to 16 times as many while little changes. 0: never. Shows in
+  /// speed only. >= 0.
   int regroup_every = 16;
   int width = 0;  ///< lanes per pack, for tests; 0: what fills a register
 };

@@ -48,8 +48,8 @@ class Batch(Profiled):
     num_threads: 0 for one per core that this process may use. pin_threads: bind each but the calling one
         to a core.
     instruction_set: "avx512", "avx2" or "neon"; None for what STICKSLIP_ISA says, else the widest that the machine has.
-    regroup_every: steps after which environments that touch the ground with the same points are brought together in packs;
-        0 for never. Shows in speed only.
+    regroup_every: steps, at least, after which environments that touch the ground with the same points are brought together
+        in packs, up to 16 times as many while little changes; 0 for never. Shows in speed only.
 
     ValueError says what a batch cannot hold (no robot or several, a method other than "auto", ...) and what to do.
 

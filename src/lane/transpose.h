@@ -41,22 +41,36 @@ STICKSLIP_INLINE void transpose_block(Pack<T, W> (&x)[W]) {
   }
 }
 
-/// out[k] = numbers k of the rows `rows` (W) of an array (any, n). Up to W numbers behind the last
-/// row are read (and not used): arrays are padded.
+/// Where the block of W numbers that begins at `first` of a row lies: the last one ends with the
+/// row, so that some numbers are turned twice and none beside the row is touched, which may be
+/// another thread's.
+STICKSLIP_INLINE int block_start(int first, int n, int width) {
+  return first + width <= n ? first : n - width;
+}
+
+/// Number k of W rows of n numbers.
+template <class S, int... I>
+STICKSLIP_INLINE S column(const Value<S>* array, const int* rows, int n, int k, LaneList<I...>) {
+  return typename S::Vector{array[long(rows[I]) * n + k]...};
+}
+
+/// out[k] = numbers k of the rows `rows` (W) of an array (any, n).
 template <class S>
 STICKSLIP_INLINE void load_rows(const Value<S>* array, const int* rows, int n, S* out) {
-  if constexpr (ScalarTraits<S>::kWidth == 1) {
-    const Value<S>* row = array + long(rows[0]) * n;
-    for (int k = 0; k < n; ++k) out[k] = row[k];
+  constexpr int W = ScalarTraits<S>::kWidth;
+  if constexpr (W == 1) {
+    for (int k = 0; k < n; ++k) out[k] = array[long(rows[0]) * n + k];
+  } else if (n < W) {
+    for (int k = 0; k < n; ++k)
+      out[k] = column<S>(array, rows, n, k, typename MakeLaneList<W>::Type{});
   } else {
-    constexpr int W = ScalarTraits<S>::kWidth;
     for (int first = 0; first < n; first += W) {
+      const int start = block_start(first, n, W);
       S block[W];
       for (int i = 0; i < W; ++i)
-        __builtin_memcpy(&block[i], array + long(rows[i]) * n + first, sizeof(S));
+        __builtin_memcpy(&block[i], array + long(rows[i]) * n + start, sizeof(S));
       transpose_block(block);
-      const int count = n - first < W ? n - first : W;
-      for (int k = 0; k < count; ++k) out[first + k] = block[k];
+      for (int k = 0; k < W; ++k) out[start + k] = block[k];
     }
   }
 }
@@ -64,23 +78,20 @@ STICKSLIP_INLINE void load_rows(const Value<S>* array, const int* rows, int n, S
 /// The way back.
 template <class S>
 STICKSLIP_INLINE void store_rows(const S* in, int n, Value<S>* array, const int* rows) {
-  if constexpr (ScalarTraits<S>::kWidth == 1) {
-    Value<S>* row = array + long(rows[0]) * n;
-    for (int k = 0; k < n; ++k) row[k] = in[k];
+  constexpr int W = ScalarTraits<S>::kWidth;
+  if constexpr (W == 1) {
+    for (int k = 0; k < n; ++k) array[long(rows[0]) * n + k] = in[k];
+  } else if (n < W) {
+    for (int i = 0; i < W; ++i)
+      for (int k = 0; k < n; ++k) array[long(rows[i]) * n + k] = get_lane(in[k], i);
   } else {
-    constexpr int W = ScalarTraits<S>::kWidth;
     for (int first = 0; first < n; first += W) {
-      const int count = n - first < W ? n - first : W;
+      const int start = block_start(first, n, W);
       S block[W];
-      for (int k = 0; k < W; ++k) block[k] = in[first + (k < count ? k : 0)];
+      for (int k = 0; k < W; ++k) block[k] = in[start + k];
       transpose_block(block);
-      if (count == W) {
-        for (int i = 0; i < W; ++i)
-          __builtin_memcpy(array + long(rows[i]) * n + first, &block[i], sizeof(S));
-      } else {
-        for (int i = 0; i < W; ++i)
-          __builtin_memcpy(array + long(rows[i]) * n + first, &block[i], count * sizeof(Value<S>));
-      }
+      for (int i = 0; i < W; ++i)
+        __builtin_memcpy(array + long(rows[i]) * n + start, &block[i], sizeof(S));
     }
   }
 }

@@ -13,7 +13,7 @@ class AlignedBlock {
  public:
   AlignedBlock() = default;
   /// Throws ModelError where memory is short.
-  explicit AlignedBlock(std::size_t bytes) : bytes_(bytes + kSlack) {
+  explicit AlignedBlock(std::size_t bytes) : bytes_(bytes) {
     void* p = ::operator new(bytes_, std::align_val_t(kLine), std::nothrow);
     if (!p)
       throw ModelError("no memory for " + std::to_string(bytes) +
@@ -27,7 +27,6 @@ class AlignedBlock {
 
  private:
   static constexpr std::size_t kLine = 64;
-  static constexpr std::size_t kSlack = 64;  // the last read of a pack may reach behind its array
   struct Free {
     void operator()(char* p) const { ::operator delete(p, std::align_val_t(kLine)); }
   };

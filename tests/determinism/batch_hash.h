@@ -16,8 +16,8 @@ struct How {
   int width = 0;
   int threads = 1;
   bool shuffled = false;  // environments in other places, beside other neighbors
-  int regroup_every = 16;
   bool reloaded = false;  // saved in the middle and gone on with in a new batch of another pack
+  int regroup_every = 16;
 
   BatchOptions options(Precision precision) const {
     BatchOptions o = batch_options(kEnvs, precision, threads);
@@ -160,8 +160,14 @@ inline std::vector<state_hash::Entry> all(const ModelPtr& anymal) {
 inline std::vector<How> ways(Precision precision, bool threads) {
   std::vector<How> out;
   for (const PackShape& shape : pack_shapes(precision)) {
-    out.push_back({shape.instruction_set, shape.width, 1, false, 0});
-    out.push_back({shape.instruction_set, shape.width, 2, true, 3, true});
+    out.push_back(
+        {.instruction_set = shape.instruction_set, .width = shape.width, .regroup_every = 0});
+    out.push_back({.instruction_set = shape.instruction_set,
+                   .width = shape.width,
+                   .threads = 2,
+                   .shuffled = true,
+                   .reloaded = true,
+                   .regroup_every = 3});
   }
   const How narrowest = *std::min_element(
       out.begin(), out.end(), [](const How& a, const How& b) { return a.width < b.width; });

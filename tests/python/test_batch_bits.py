@@ -171,17 +171,49 @@ def test_regrouping_changes_no_bit(dtype: str, integrator: str) -> None:
         return batch
 
     never, often, other = make(0), make(1), make(7)
-    for round in range(6):
+    for part in range(6):
         for b in (never, often, other):
-            run(b, 30, 30 * round)
-            b.reset([round, 40 - round])
-            b.body_mass[7 * round, 3] *= 1.5
-            b.q[9 + round, 2] += 0.1
-        often.load_state(other.save_state())
-        assert_same_bits(often, never, ("q", "u", *OUTPUTS))
-        assert_same_bits(other, never, ("q", "u", *OUTPUTS))
-        assert often.save_state() == never.save_state()
+            run(b, 30, 30 * part)
+        for b in (often, other):
+            assert_same_bits(b, never, ("q", "u", *OUTPUTS))
+            assert b.save_state() == never.save_state()
         assert len(np.unique(never.contact_active, axis=0)) > 6, "all touch alike, so it showed little"
+        for b in (never, often, other):
+            b.load_state(other.save_state())  # into places of its own
+            b.reset([part, 40 - part])
+            b.body_mass[7 * part, 3] *= 1.5
+            b.q[9 + part, 2] += 0.1
+
+
+@pytest.mark.parametrize("dtype", NUMBERS)
+def test_regrouping_in_several_blocks_and_threads_changes_no_bit(dtype: str) -> None:
+    # 601: the last block and the last pack are not full.
+    def make(num_threads: int, regroup_every: int) -> ss.Batch:
+        batch = ss.Batch(anymal(), 601, dtype, num_threads, regroup_every=regroup_every)
+        batch.reset(None, *scattered_states(601))
+        batch.body_mass[:, 0] *= np.linspace(0.9, 1.1, 601)
+        return batch
+
+    never, often = make(1, 0), make(3, 1)
+    for part in range(4):
+        for b in (never, often):
+            run(b, 30, 30 * part)
+            b.step(20)  # is cut
+            b.reset(np.arange(part, 601, 50))
+        assert_same_bits(often, never, ("q", "u", *OUTPUTS))
+    assert len(np.unique(never.contact_active, axis=0)) > 20
+
+
+@pytest.mark.parametrize("dtype", NUMBERS)
+def test_environment_that_is_set_aside_may_change_its_lane_within_a_call(dtype: str) -> None:
+    never, often = (ss.Batch(anymal(), 45, dtype, regroup_every=every) for every in (0, 1))
+    for b in (never, often):
+        b.reset(None, *scattered_states(45))
+        run(b, 60)
+        b.q[21, 2] = np.nan
+        assert ss.StepStatus.NON_FINITE in b.step(40)
+        assert b.flagged(ss.StepStatus.NON_FINITE).tolist() == [21]
+    assert_same_bits(often, never, ("q", "u", *OUTPUTS))
 
 
 # Many steps in a call
@@ -189,8 +221,8 @@ def test_regrouping_changes_no_bit(dtype: str, integrator: str) -> None:
 
 @pytest.mark.parametrize("dtype", NUMBERS)
 def test_several_steps_at_once_are_steps_one_by_one(dtype: str) -> None:
-    one, many = scattered(9, dtype), scattered(9, dtype)
-    status, residual = np.zeros(9, np.uint32), np.zeros(9, dtype)
+    one, many = scattered(33, dtype), scattered(33, dtype)
+    status, residual = np.zeros(33, np.uint32), np.zeros(33, dtype)
     for _ in range(60):
         one.step()
         status |= one.status

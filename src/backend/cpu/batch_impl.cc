@@ -66,7 +66,7 @@ Batch::Impl::Impl(const World::Impl& world, const BatchOptions& o)
       history_rows(scene.tables()),
       settings(world.settings),
       padded(round_up(o.num_envs, kernels->width)),
-      grouping(o.num_envs, padded, kernels->width, o.regroup_every),
+      grouping(o.num_envs, padded, kernels->width, scene.tables().num_points, o.regroup_every),
       memory(scene.tables(), o.precision, o.num_envs, padded),
       bodies(*model, layout, *kernels, grouping, padded),
       pool(thread_count(o, padded / kernels->width), o.pin_threads) {
@@ -241,8 +241,7 @@ void Batch::Impl::regroup_block(void* self, int, long block) {
        static_cast<int>(backend::size_of(b.memory.type(BatchField::kQ)))},
       bodies[0],
       bodies[1]};
-  b.grouping.regroup(block, b.running_.contact_active, b.scene.tables().num_points,
-                     {carried, b.bodies.used() ? 3u : 1u});
+  b.grouping.regroup(block, b.running_.contact_active, {carried, b.bodies.used() ? 3u : 1u});
 }
 
 std::uint32_t Batch::Impl::step(int steps, bool continues) {

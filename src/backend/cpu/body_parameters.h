@@ -2,6 +2,8 @@
 // lanes side by side. Users write them in body frames (BatchField::kBodyMass and its neighbors);
 // what has changed is turned before the pack is stepped, in double like a model's.
 #pragma once
+#include <array>
+
 #include "backend/cpu/batch_memory.h"
 #include "backend/cpu/grouping.h"
 #include "backend/cpu/pack_kernels.h"

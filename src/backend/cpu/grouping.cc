@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cstring>
+#include <cassert>
 #include <numeric>
 
 namespace stickslip::backend {
@@ -26,21 +26,24 @@ struct Candidate {
 
 }  // namespace
 
-Grouping::Grouping(long num_envs, long padded, int width, int every)
+Grouping::Grouping(long num_envs, long padded, int width, int points, int every)
     : num_envs_(num_envs),
       width_(width),
-      every_(width > 1 && num_envs > width ? every : 0),
+      points_(points),
+      every_(width > 1 && num_envs > width && points > 0 ? every : 0),
       interval_(every_),
       order_block_(padded * sizeof(int)),
       places_block_(padded * sizeof(int)),
       order_(reinterpret_cast<int*>(order_block_.data())),
       places_(reinterpret_cast<int*>(places_block_.data())) {
+  assert(kBlock % width == 0);  // packs belong to one block
   std::iota(order_, order_ + padded, 0);
   std::iota(places_, places_ + padded, 0);
 }
 
 int Grouping::part_of(int steps) const {
-  return interval_ > 0 ? static_cast<int>(std::min<long>(steps, interval_)) : steps;
+  // A short rest is taken along: every part costs a load and a store.
+  return interval_ > 0 && steps >= 2 * interval_ ? static_cast<int>(interval_) : steps;
 }
 
 void Grouping::restart() {
@@ -51,13 +54,12 @@ void Grouping::restart() {
   steps_ = 0;
 }
 
-void Grouping::regroup(long block, const std::uint8_t* active, int points,
-                       std::span<const LaneRows> carried) {
+void Grouping::regroup(long block, const std::uint8_t* active, std::span<const LaneRows> carried) {
   const long first = block * kBlock, n = std::min<long>(kBlock, num_envs_ - first);
   std::array<Candidate, kBlock> sorted;
   for (long k = 0; k < n; ++k) {
     const int env = order_[first + k];
-    sorted[k] = {key_of(active + long{env} * points, points), static_cast<int>(first + k), env};
+    sorted[k] = {key_of(active + long{env} * points_, points_), static_cast<int>(first + k), env};
   }
   std::sort(sorted.begin(), sorted.begin() + n);
   // Who is in the right pack already keeps its lane.

@@ -3,6 +3,7 @@
 // is done (docs/theory/batch.md, section 9). Shows in no bit.
 #pragma once
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
@@ -21,10 +22,11 @@ struct LaneRows {
 /// places, so that what a pack loads stays near; those that fill up the last pack stay.
 class Grouping {
  public:
-  static constexpr int kBlock = 256;  // a multiple of every width
+  static constexpr int kBlock = 256;
 
-  /// `every`: steps between regroupings, more while they move few environments; 0: never.
-  Grouping(long num_envs, long padded, int width, int every);
+  /// `every`: steps between regroupings, at least, and more while they move few environments; 0:
+  /// never. Without `points` there is nothing to tell environments apart.
+  Grouping(long num_envs, long padded, int width, int points, int every);
 
   /// The environment at each place.
   const int* order() const { return order_; }
@@ -41,18 +43,17 @@ class Grouping {
   void restart();
   /// Of several blocks at the same time. `active`: flags (environments, points). `carried` moves
   /// along.
-  void regroup(long block, const std::uint8_t* active, int points,
-               std::span<const LaneRows> carried);
+  void regroup(long block, const std::uint8_t* active, std::span<const LaneRows> carried);
 
  private:
   void exchange(long a, long b, std::span<const LaneRows> carried);
 
   const long num_envs_;
-  const int width_;
+  const int width_, points_;
   const long every_;
   long interval_;                // to the next regrouping
   long steps_ = 0;               // since the last one
-  std::atomic<long> moved_ = 0;  // environments, by the one under way
+  std::atomic<long> moved_ = 0;  // exchanges, by the one under way
   world::AlignedBlock order_block_, places_block_;
   int *order_, *places_;
 };

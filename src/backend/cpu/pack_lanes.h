@@ -19,7 +19,7 @@ class PackLanes {
 
   /// Takes the environments at places first .. first + width - 1. A state that was written since
   /// the last step starts afresh; one that is not a state (NaN, no unit quaternion) is set aside.
-  /// Lanes beyond num_envs repeat the last environment.
+  /// Lanes beyond num_envs repeat the last one before.
   void load(const EnvArrays& arrays, long first, long num_envs);
   void use_inertias(const PackInertias& inertias);
   /// Before each step of the robot: whether `store` will ask for its contacts.

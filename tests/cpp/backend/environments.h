@@ -103,7 +103,7 @@ inline BatchOptions batch_options(int num_envs, Precision precision = Precision:
   o.num_envs = num_envs;
   o.precision = precision;
   o.num_threads = num_threads;
-  o.regroup_every = 3;  // often: which pack an environment is in shows nowhere
+  o.regroup_every = 3;  // often; it shows nowhere
   return o;
 }
 

@@ -93,19 +93,19 @@ TEST(ManyStepsAtOnceAreStepsOneByOne) {
   for (const Precision precision : kPrecisions)
     for (const ThrownTree& t : thrown_trees()) {
       if (t.seed > 3) continue;
-      Batch many = crowd(t, batch_options(9, precision), numbers(9)),
-            one = crowd(t, batch_options(9, precision), numbers(9));
+      Batch many = crowd(t, batch_options(21, precision), numbers(21)),
+            one = crowd(t, batch_options(21, precision), numbers(21));
       many.step(150);
-      std::vector<double> residual(9);
-      std::vector<std::uint32_t> bits(9);
+      std::vector<double> residual(21);
+      std::vector<std::uint32_t> bits(21);
       for (int step = 0; step < 150; ++step) {
         one.step();
-        for (int env = 0; env < 9; ++env) {
+        for (int env = 0; env < 21; ++env) {
           residual[env] = std::fmax(residual[env], number(one, BatchField::kResidual, env, 0));
           bits[env] |= static_cast<std::uint32_t>(status(one, env));
         }
       }
-      for (int env = 0; env < 9; ++env) {
+      for (int env = 0; env < 21; ++env) {
         CHECK(number(many, BatchField::kResidual, env, 0) == residual[env]);
         CHECK(static_cast<std::uint32_t>(status(many, env)) == bits[env]);
         set_row(one, BatchField::kResidual, env, {&residual[env], 1});
@@ -154,14 +154,14 @@ TEST(AStateSavedByPacksOfOneWidthIsReadByAnother) {
   for (const Precision precision : kPrecisions)
     for (const ThrownTree& t : thrown_trees()) {
       if (t.seed > 4) continue;
-      Batch whole = crowd(t, batch_options(11, precision), numbers(11));
+      Batch whole = crowd(t, batch_options(21, precision), numbers(21));
       whole.step(130);
       const std::vector<std::uint8_t> saved = whole.save_state();
       whole.step(70);
       for (const PackShape& shape : pack_shapes(precision)) {
-        BatchOptions o = batch_options(11, precision, 2);
+        BatchOptions o = batch_options(21, precision, 2);
         o.instruction_set = shape.instruction_set, o.width = shape.width;
-        Batch other = crowd(t, o, numbers(11));
+        Batch other = crowd(t, o, numbers(21));
         other.step(33);
         other.load_state(saved);
         CHECK(other.save_state() == saved);

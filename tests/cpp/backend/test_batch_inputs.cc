@@ -1,5 +1,7 @@
 // What an environment of a batch is given acts on it as on a world of its own, and on no other:
 // numbers that are not finite, parameters, wrenches.
+#include <stickslip/errors.h>
+
 #include <algorithm>
 #include <limits>
 
@@ -327,4 +329,17 @@ TEST(AWrenchActsAsTheGeneralizedForceOfItsPoint) {
                                row<double>(batch, BatchField::kU, kOne - 1)) > 0.1);
       CHECK(same_environment(batch, kOne - 1, batch, 0));
     }
+}
+
+TEST(OptionsThatAreNoneAreRejectedWithWhatTheyMustBe) {
+  const World world = thrown_trees()[0].make_world();
+  const auto make = [&](auto&& change) {
+    BatchOptions o;
+    change(o);
+    Batch batch(world, o);
+  };
+  CHECK_THROWS(make([](BatchOptions& o) { o.num_envs = 0; }), ModelError, "num_envs is 0");
+  CHECK_THROWS(make([](BatchOptions& o) { o.num_threads = -1; }), ModelError, "num_threads is -1");
+  CHECK_THROWS(make([](BatchOptions& o) { o.regroup_every = -1; }), ModelError,
+               "regroup_every is -1; it must be 0 (never)");
 }

@@ -1,5 +1,6 @@
 // Who shares a pack: environments with the same set of points, whatever they carry going along.
 #include <algorithm>
+#include <limits>
 #include <random>
 #include <set>
 
@@ -19,7 +20,7 @@ struct Crowd {
         width(width),
         points(points),
         padded((num_envs + width - 1) / width * width),
-        grouping(num_envs, padded, width, 16),
+        grouping(num_envs, padded, width, points, 16),
         active(static_cast<size_t>(padded * points)),
         singles(static_cast<size_t>(padded * 5)),
         doubles(static_cast<size_t>(padded * 3)) {
@@ -39,7 +40,7 @@ struct Crowd {
     const LaneRows carried[] = {{reinterpret_cast<char*>(singles.data()), 5, 4},
                                 {reinterpret_cast<char*>(doubles.data()), 3, 8}};
     for (long block = 0; block < grouping.blocks(); ++block)
-      grouping.regroup(block, active.data(), points, carried);
+      grouping.regroup(block, active.data(), carried);
     grouping.restart();
   }
   std::vector<std::uint8_t> set_of(int env) const {
@@ -159,12 +160,21 @@ TEST(WhatDoesNotChangeIsRegroupedLessAndLessOften) {
 }
 
 TEST(WhereThereIsNothingToGainNoRegroupingIsDue) {
-  Grouping one_pack(8, 8, 8, 16), one_lane(64, 64, 1, 16), never(64, 64, 8, 0);
-  for (Grouping* g : {&one_pack, &one_lane, &never}) {
+  Grouping one_pack(8, 8, 8, kPoints, 16), one_lane(64, 64, 1, kPoints, 16),
+      no_points(64, 64, 8, 0, 16), never(64, 64, 8, kPoints, 0);
+  for (Grouping* g : {&one_pack, &one_lane, &no_points, &never}) {
     CHECK(g->part_of(1000) == 1000);
     g->count(1000);
     CHECK(!g->due());
   }
-  Grouping often(64, 64, 8, 16);
-  CHECK(often.part_of(1000) == 16 && often.part_of(5) == 5);
+}
+
+TEST(LongCallsAreCutWhereRegroupingIsDueAndShortRestsTakenAlong) {
+  const Grouping often(64, 64, 8, kPoints, 16);
+  for (const int steps : {1, 16, 20, 31}) CHECK(often.part_of(steps) == steps);
+  CHECK(often.part_of(32) == 16 && often.part_of(1000) == 16);
+  constexpr int kMost = std::numeric_limits<int>::max();
+  Grouping seldom(64, 64, 8, kPoints, kMost);
+  for (int k = 0; k < 6; ++k) seldom.restart();
+  CHECK(seldom.part_of(kMost) == kMost && !seldom.due());
 }
