@@ -54,8 +54,10 @@ TEST(RowsInAnyOrderComeIntoLanesAndBackAndNothingElseIsTouched) {
   check_rows<float>();
   check_rows<Pack<double, 2>>();
   check_rows<Pack<double, 4>>();
-  check_rows<Pack<double, 8>>();
   check_rows<Pack<float, 4>>();
   check_rows<Pack<float, 8>>();
+#ifndef __SANITIZE_ADDRESS__  // wider than a register: with checks in it, minutes to compile
+  check_rows<Pack<double, 8>>();
   check_rows<Pack<float, 16>>();
+#endif
 }
