@@ -111,6 +111,22 @@ def test_unknown_arguments_are_named_beside_those_of_the_task() -> None:
         Falling(3, foo=1)
 
 
+def test_regrouping_of_the_batch_shows_in_no_observation() -> None:
+    # Off unless asked for.
+    module = SimpleNamespace(**runpy.run_path(str(ROOT / "examples" / "write_your_own_task.py")))
+    task = next(
+        x for x in vars(module).values() if isinstance(x, type) and issubclass(x, VectorTask) and x is not VectorTask
+    )
+    plain, regrouped = task(40), task(40, regroup_every=1)
+    rng = np.random.default_rng(2)
+    for envs in (plain, regrouped):
+        envs.reset(seed=3)
+    for _ in range(40):
+        action = rng.uniform(-1, 1, plain.action_space.shape).astype(np.float32)
+        a, b = plain.step(action), regrouped.step(action)
+        assert a[0].tobytes() == b[0].tobytes() and a[1].tobytes() == b[1].tobytes()
+
+
 def test_example_jumps(capsys) -> None:
     module = SimpleNamespace(**runpy.run_path(str(ROOT / "examples" / "write_your_own_task.py")))
     module.check()

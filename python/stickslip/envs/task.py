@@ -131,6 +131,8 @@ class VectorTask(VectorEnv):
         _check_options(type(self), options)
         self.world = self.make_world()
         self.robot = self.world.robots[0] if self.world.robots else None
+        # Robots that walk in steps of some milliseconds change their feet too soon for it (docs/design/011).
+        options = {"regroup_every": 0, **options}
         self.batch = Batch(self.world, self.num_envs, dtype, num_threads, **options)
         self.step_seconds = self.world.time_step * _positive("decimation", self.decimation)
         if self.action_size is None:
