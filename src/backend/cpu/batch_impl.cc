@@ -152,8 +152,7 @@ void Batch::Impl::fill_start(const world::RobotData& robot) {
 }
 
 long Batch::Impl::history_at(long env, int row) const {
-  const long place = grouping.place(env), w = kernels->width;
-  return (place / w * history_rows.numbers + row) * w + place % w;
+  return backend::number_at(grouping.place(env), row, history_rows.numbers, kernels->width);
 }
 double Batch::Impl::history(long env, int row) const {
   return backend::get_number(history_block.data(), memory.type(BatchField::kQ),

@@ -96,9 +96,8 @@ void BodyParameters::put_link(long env, int slot, int lane,
 
 void BodyParameters::put_base(long env, const dynamics::LinkInertia<double>& inertia) {
   const NumberType type = kernels_.single ? NumberType::kFloat32 : NumberType::kFloat64;
-  const long place = grouping_.place(env), w = kernels_.width;
   for (int k = 0; k < kNumbers; ++k)
-    set_number(base_.data(), type, (place / w * kNumbers + k) * w + place % w,
+    set_number(base_.data(), type, number_at(grouping_.place(env), k, kNumbers, kernels_.width),
                reinterpret_cast<const double*>(&inertia)[k]);
 }
 

@@ -90,8 +90,7 @@ void Grouping::exchange(long a, long b, std::span<const LaneRows> carried) {
   places_[order_[b]] = static_cast<int>(b);
   for (const LaneRows& rows : carried) {
     const auto at = [&](long place) {
-      const long number = place / width_ * rows.numbers * width_ + place % width_;
-      return rows.data + number * rows.number_bytes;
+      return rows.data + number_at(place, 0, rows.numbers, width_) * rows.number_bytes;
     };
     const auto swap_all = [&]<class T>(T) {
       T *x = reinterpret_cast<T*>(at(a)), *y = reinterpret_cast<T*>(at(b));

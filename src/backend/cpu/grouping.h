@@ -18,6 +18,11 @@ struct LaneRows {
   int number_bytes;
 };
 
+/// Where number k of the environment at `place` is in such an array.
+inline long number_at(long place, long k, long numbers, int width) {
+  return (place / width * numbers + k) * width + place % width;
+}
+
 /// Place p is lane p % width of pack p / width. Environments change places within a block of
 /// places, so that what a pack loads stays near; those that fill up the last pack stay.
 class Grouping {
