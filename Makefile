@@ -4,6 +4,7 @@
 # make bench   stickslip beside MuJoCo on the same tasks (BENCH="..." for its options)
 # make bench-contact   its contact solver beside those of Pinocchio and Siconos
 # make sanitize  C++ tests with address and undefined-behavior sanitizers
+# make test-arm  C++ tests compiled for ARM, in an emulator (needs a cross compiler and QEMU)
 #
 # Needs a C++20 compiler and Python >= 3.10 with venv; everything else comes into .venv with pip.
 
@@ -24,7 +25,7 @@ CXX_TESTS := $(shell find tests/cpp -type f 2>/dev/null)
 # One build folder serves the package and the C++ tests, so that nothing is compiled twice.
 INSTALL = $(BIN)/python -m pip install -q --no-build-isolation -C build-dir=$(BUILD)
 
-.PHONY: run test test-cpp test-python bench bench-contact sanitize lint format clean
+.PHONY: run test test-cpp test-python test-arm bench bench-contact sanitize lint format clean
 .DELETE_ON_ERROR:
 MAKEFLAGS += --no-builtin-rules
 
@@ -78,13 +79,30 @@ bench: $(VENV)/bench
 bench-contact: $(VENV)/bench
 	$(BIN)/python benchmarks/contact/run.py $(BENCH)
 
+# Whole tasks take ten times as long with sanitizers and in emulators; the trot, which is left, runs the same code.
+LONG_TESTS := physics_test_(tasks|large_steps)
+
 # -O1: with checks in every unrolled kernel, -O2 takes minutes and gigabytes per file.
-# Without the longest runs of whole tasks: ten times slower here, and the trot runs the same code.
 sanitize: $(VENV)/tools
 	$(BIN)/cmake -S . -B build/sanitize -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja -DPython_EXECUTABLE=$(abspath $(BIN))/python \
 	  -DCMAKE_BUILD_TYPE=RelWithDebInfo -DCMAKE_CXX_FLAGS_RELWITHDEBINFO='-O1 -g1' -DSTICKSLIP_TESTS=ON -DSTICKSLIP_SANITIZE=ON
 	$(BIN)/cmake --build build/sanitize
-	$(BIN)/ctest --test-dir build/sanitize --output-on-failure -j $(CMAKE_BUILD_PARALLEL_LEVEL) -E 'physics_test_(tasks|large_steps)'
+	$(BIN)/ctest --test-dir build/sanitize --output-on-failure -j $(CMAKE_BUILD_PARALLEL_LEVEL) -E '$(LONG_TESTS)'
+
+# Shows that NEON compiles and has the bits of every other instruction set, on a machine without it. urdfdom is ARM's wheel.
+ARM_WHEELS := build/aarch64-wheels
+test-arm: $(VENV)/tools
+	@command -v aarch64-linux-gnu-g++ >/dev/null && command -v qemu-aarch64 >/dev/null || \
+	  { echo "aarch64-linux-gnu-g++ and qemu-aarch64 are needed (Debian and Ubuntu: packages g++-aarch64-linux-gnu, qemu-user)."; exit 1; }
+	mkdir -p build
+	grep cmeel $(VENV)/tools.txt > build/aarch64-wheels.txt
+	$(BIN)/python -m pip install -q --upgrade --target $(ARM_WHEELS) --only-binary=:all: \
+	  --platform manylinux_2_28_aarch64 --platform manylinux_2_17_aarch64 -r build/aarch64-wheels.txt
+	$(BIN)/cmake -S . -B build/aarch64 -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja -DPython_EXECUTABLE=$(abspath $(BIN))/python \
+	  -DCMAKE_TOOLCHAIN_FILE=cmake/aarch64.cmake -DSTICKSLIP_CMEEL_PREFIX=$(abspath $(ARM_WHEELS))/cmeel.prefix \
+	  -DSTICKSLIP_TESTS=ON -DSTICKSLIP_WERROR=ON
+	$(BIN)/cmake --build build/aarch64
+	$(BIN)/ctest --test-dir build/aarch64 --output-on-failure -j $(CMAKE_BUILD_PARALLEL_LEVEL) -E '$(LONG_TESTS)'
 
 .PHONY: lint-kernels
 lint-kernels: $(VENV)/tools
