@@ -9,13 +9,15 @@ namespace stickslip::benchmarks {
 namespace {
 
 constexpr double kThreadEfficiency = 0.95;  // two threads: 1.9 times one
+constexpr const char *kThreads = "_threads", *kApart = "_apart";
 constexpr double kFloat64Share = 0.5, kAvx2Share = 0.6, kEnergySafeShare = 0.5;
 
 [[noreturn]] void refuse(const std::string& name) {
   throw std::invalid_argument(
       "unknown engine '" + name +
       "'; there are mujoco, semi_implicit, energy_safe and "
-      "batch_<float32|float64>[_energy_safe][_avx2|_avx512|_neon][_ungrouped][_threads<N>]");
+      "batch_<float32|float64>[_energy_safe][_avx2|_avx512|_neon][_ungrouped]"
+      "[_threads<N>|_apart<N>]");
 }
 
 }  // namespace
@@ -47,14 +49,15 @@ EngineChoice engine_choice(const std::string& name) {
   for (const char* set : {"avx2", "avx512", "neon"})
     if (e.instruction_set.empty() && take(std::string("_") + set)) e.instruction_set = set;
   e.regroups = !take("_ungrouped");
-  const std::string threads = "_threads";
-  if (rest.starts_with(threads)) {
-    const std::string digits = rest.substr(threads.size());
+  for (const std::string suffix : {kThreads, kApart}) {
+    if (!rest.starts_with(suffix)) continue;
+    const std::string digits = rest.substr(suffix.size());
     if (digits.empty() || digits.size() > 3 ||
         digits.find_first_not_of("0123456789") != std::string::npos)
       refuse(name);
     e.threads = std::stoi(digits);
     if (e.threads == 0) refuse(name);
+    e.apart = suffix == kApart;
     rest.clear();
   }
   if (!rest.empty()) refuse(name);
@@ -70,6 +73,7 @@ std::vector<std::string> default_engines() {
   if (std::thread::hardware_concurrency() >= 2) {
     names.push_back("batch_float32_threads1");
     names.push_back("batch_float32_threads2");
+    names.push_back("batch_float32_apart2");
   }
   names.push_back("mujoco");
   return names;
@@ -80,10 +84,10 @@ Aim aim_of(const EngineChoice& e, const Scenario& s, const std::string& instruct
   if (e.kind == EngineKind::kWorld)
     return {"mujoco",
             e.integrator == Integrator::kSemiImplicit ? s.aim_world : s.aim_world_energy_safe};
+  if (e.threads > 1 || e.apart)
+    return {e.name.substr(0, e.name.rfind(e.apart ? kApart : kThreads)) + kThreads + "1",
+            e.apart ? 0 : kThreadEfficiency * e.threads};
   if (e.threads == 1) return {};
-  if (e.threads > 1)
-    return {e.name.substr(0, e.name.rfind("_threads")) + "_threads1",
-            kThreadEfficiency * e.threads};
   double aim = s.aim_batch;
   if (instruction_set != "avx512") aim *= kAvx2Share;
   if (e.precision == Precision::kFloat64) aim *= s.aim_batch_variants ? kFloat64Share : 0;

@@ -12,10 +12,11 @@ namespace stickslip::benchmarks {
 
 enum class EngineKind { kMujoco, kWorld, kBatch };
 
-/// batch_<float32|float64>[_energy_safe][_<instruction set>][_ungrouped][_threads<N>]. Ungrouped:
-/// environments stay in the packs that they are put into. With _threads the batch
-/// is large and the wall clock counts, also for one thread: that one is what others are compared
-/// with.
+/// batch_<float32|float64>[_energy_safe][_<instruction set>][_ungrouped][_threads<N>|_apart<N>].
+/// Ungrouped: environments stay in the packs that they are put into. With _threads the batch is
+/// large and the wall clock counts, also for one thread: that one is what others are compared with.
+/// Apart: N batches with a share of the robots and one thread each, which know nothing of each
+/// other: what the machine gives to N threads.
 struct EngineChoice {
   std::string name;
   EngineKind kind = EngineKind::kMujoco;
@@ -23,6 +24,7 @@ struct EngineChoice {
   Precision precision = Precision::kFloat64;
   std::string instruction_set;  ///< empty: the widest that the machine has
   int threads = 0;              ///< 0: one, without the suffix
+  bool apart = false;           ///< the threads belong to as many batches
   bool regroups = true;
 
   bool wall_clock() const { return threads > 0; }

@@ -20,7 +20,7 @@ constexpr const char* kUsage =
     "  --engines A,B       of mujoco; one robot: semi_implicit, energy_safe; many robots:\n"
     "                      "
     "batch_<float32|float64>[_energy_safe][_avx2|_avx512|_neon][_ungrouped]\n"
-    "                      [_threads<N>]\n"
+    "                      [_threads<N>|_apart<N>]\n"
     "                      (default: what benchmarks/README.md lists)\n"
     "  --robots-per-batch N   a multiple of 16 (default 64)\n"
     "  --steps N           per repetition (default 2000); a batch takes 16 N robot-steps\n"
@@ -92,7 +92,7 @@ Options parse(int argc, char** argv) {
   auto& engines = o.settings.engines;
   if (engines.empty())
     for (const std::string& e : default_engines()) engines.push_back(engine_choice(e));
-  if (o.settings.robots % 16)
+  if (o.settings.robots % Settings::kFullPack)
     throw std::invalid_argument("--robots-per-batch needs a multiple of 16: full packs");
   if (o.check &&
       std::ranges::none_of(engines, [](const auto& e) { return e.kind == EngineKind::kMujoco; }))
@@ -116,7 +116,8 @@ int run(const Options& o) {
 
   const int core = pin(o.core);
   std::printf(
-      "one thread (but for _threads), core %d, dt = 1 ms, %ld steps x %d repetitions, in turns; "
+      "one thread (but for _threads, _apart), core %d, dt = 1 ms, %ld steps x %d repetitions, in "
+      "turns; "
       "batches of %d robots\n\n",
       core, o.settings.steps, o.settings.repetitions, o.settings.robots);
   print_header();

@@ -15,6 +15,7 @@ struct Settings {
   std::vector<EngineChoice> engines;
   bool statistics = true;
 
+  static constexpr int kFullPack = 16;  // of the widest instructions
   static constexpr int kBatchWork = 16, kLargeBatch = 16;
   static constexpr int kThreadWork = 40;  // instead: long against a move to another core
 };
