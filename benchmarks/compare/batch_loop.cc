@@ -26,22 +26,24 @@ Batch BatchEngine<T>::make(const Scenario& s, const EngineChoice& choice, int nu
   BatchOptions options;
   options.num_envs = num_envs;
   options.precision = choice.precision;
-  options.num_threads = std::max(1, choice.threads);
+  options.num_threads = choice.apart ? 1 : std::max(1, choice.threads);
+  options.pin_threads = true;  // those beside the caller's, which OnCores pins
   options.instruction_set = choice.instruction_set;
   if (!choice.regroups) options.regroup_every = 0;
   return Batch(world, options);
 }
 
 template <class T>
-BatchEngine<T>::BatchEngine(const Scenario& scenario, const EngineChoice& choice, int num_envs)
+BatchEngine<T>::BatchEngine(const Scenario& scenario, const EngineChoice& choice, Share share)
     : scenario_(&scenario),
-      batch_(make(scenario, choice, num_envs)),
-      num_envs_(num_envs),
+      batch_(make(scenario, choice, share.count)),
+      num_envs_(share.count),
+      robots_(share.robots),
       nq_(scenario.model->nq()),
       nu_(scenario.model->nu()),
       joints_(scenario.model->num_joints()),
       points_(static_cast<int>(batch_.contact_points().size())),
-      stride_(golden_stride(num_envs)),
+      stride_(golden_stride(share.robots)),
       q_(data(BatchField::kQ)),
       u_(data(BatchField::kU)),
       impulse_(data(BatchField::kContactImpulse)),
@@ -49,8 +51,8 @@ BatchEngine<T>::BatchEngine(const Scenario& scenario, const EngineChoice& choice
       targets_(data(BatchField::kPdTarget)),
       active_(static_cast<const std::uint8_t*>(batch_.array(BatchField::kContactActive).data)),
       status_(static_cast<const std::uint32_t*>(batch_.array(BatchField::kStatus).data)),
-      clocks_(num_envs),
-      last_(static_cast<size_t>(num_envs) * joints_),
+      clocks_(num_envs_),
+      last_(static_cast<size_t>(num_envs_) * joints_),
       target_(joints_),
       ruler_(std::make_unique<World>()) {
   if (choice.integrator == Integrator::kSemiImplicit)
@@ -58,10 +60,10 @@ BatchEngine<T>::BatchEngine(const Scenario& scenario, const EngineChoice& choice
   if (scenario.ends_when_still && moving())
     throw std::logic_error("targets of a task that ends when still cannot be laid out");
   ruler_->add_robot(scenario.model);
-  finished_.reserve(num_envs);
-  start_q_.resize(static_cast<size_t>(num_envs) * nq_);
-  start_u_.resize(static_cast<size_t>(num_envs) * nu_);
-  for (int e = 0; e < num_envs; ++e) clocks_[e].episode = e - num_envs;
+  finished_.reserve(num_envs_);
+  start_q_.resize(static_cast<size_t>(num_envs_) * nq_);
+  start_u_.resize(static_cast<size_t>(num_envs_) * nu_);
+  for (int e = 0; e < num_envs_; ++e) clocks_[e].episode = share.first + e - robots_;
 
   prepare(scenario.episode_steps);
   NoObserver nobody;
@@ -70,13 +72,13 @@ BatchEngine<T>::BatchEngine(const Scenario& scenario, const EngineChoice& choice
 
 template <class T>
 void BatchEngine<T>::begin(EpisodeClock& clock) const {
-  clock.episode += num_envs_;
+  clock.episode += robots_;
   clock.age = 0;
   clock.still = 0;
   clock.end = scenario_->episode_steps;
-  if (clock.episode >= num_envs_) return;
-  const long ticks = clock.end / kTick, phase = clock.episode * long{stride_} % num_envs_ + 1;
-  clock.end = kTick * std::max(1L, ticks * phase / num_envs_);
+  if (clock.episode >= robots_) return;
+  const long ticks = clock.end / kTick, phase = clock.episode * long{stride_} % robots_ + 1;
+  clock.end = kTick * std::max(1L, ticks * phase / robots_);
 }
 
 template <class T>

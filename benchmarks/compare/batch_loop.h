@@ -19,9 +19,13 @@ namespace stickslip::benchmarks {
 template <class T>
 class BatchEngine {
  public:
-  /// Environment e begins with episode e and goes on with e + num_envs, and so on. The first
-  /// episodes are cut short so that after one episode's length of steps all phases are there.
-  BatchEngine(const Scenario& scenario, const EngineChoice& choice, int num_envs);
+  /// Robots first, first + 1, ... of `share.robots` of a benchmark: robot r begins with episode r
+  /// and goes on with r + share.robots, and so on. The first episodes are cut short so that after
+  /// one episode's length of steps all phases are there.
+  struct Share {
+    int first, count, robots;
+  };
+  BatchEngine(const Scenario& scenario, const EngineChoice& choice, Share share);
 
   const Batch& batch() const { return batch_; }
 
@@ -63,7 +67,7 @@ class BatchEngine {
 
   const Scenario* scenario_;
   Batch batch_;
-  const int num_envs_, nq_, nu_, joints_, points_;
+  const int num_envs_, robots_, nq_, nu_, joints_, points_;
   const int stride_;  // between the phases of neighbors, see begin
   const T *q_, *u_, *impulse_, *residual_;
   T* targets_;

@@ -3,13 +3,15 @@
 #include <algorithm>
 #include <sstream>
 #include <stdexcept>
-#include <thread>
+
+#include "benchmarks/compare/cores.h"
 
 namespace stickslip::benchmarks {
 namespace {
 
 constexpr double kThreadEfficiency = 0.95;  // two threads: 1.9 times one
-constexpr const char *kThreads = "_threads", *kApart = "_apart";
+constexpr const char* kThreadsSuffix = "_threads";
+constexpr const char* kApartSuffix = "_apart";
 constexpr double kFloat64Share = 0.5, kAvx2Share = 0.6, kEnergySafeShare = 0.5;
 
 [[noreturn]] void refuse(const std::string& name) {
@@ -49,15 +51,15 @@ EngineChoice engine_choice(const std::string& name) {
   for (const char* set : {"avx2", "avx512", "neon"})
     if (e.instruction_set.empty() && take(std::string("_") + set)) e.instruction_set = set;
   e.regroups = !take("_ungrouped");
-  for (const std::string suffix : {kThreads, kApart}) {
+  for (const std::string suffix : {kThreadsSuffix, kApartSuffix}) {
     if (!rest.starts_with(suffix)) continue;
     const std::string digits = rest.substr(suffix.size());
     if (digits.empty() || digits.size() > 3 ||
         digits.find_first_not_of("0123456789") != std::string::npos)
       refuse(name);
     e.threads = std::stoi(digits);
-    if (e.threads == 0) refuse(name);
-    e.apart = suffix == kApart;
+    e.apart = suffix == kApartSuffix;
+    if (e.threads < (e.apart ? 2 : 1)) refuse(name);
     rest.clear();
   }
   if (!rest.empty()) refuse(name);
@@ -70,7 +72,7 @@ std::vector<std::string> default_engines() {
 #ifdef __x86_64__
   names.push_back("batch_float32_avx2");
 #endif
-  if (std::thread::hardware_concurrency() >= 2) {
+  if (num_cores() >= 2) {
     names.push_back("batch_float32_threads1");
     names.push_back("batch_float32_threads2");
     names.push_back("batch_float32_apart2");
@@ -84,8 +86,8 @@ Aim aim_of(const EngineChoice& e, const Scenario& s, const std::string& instruct
   if (e.kind == EngineKind::kWorld)
     return {"mujoco",
             e.integrator == Integrator::kSemiImplicit ? s.aim_world : s.aim_world_energy_safe};
-  if (e.threads > 1 || e.apart)
-    return {e.name.substr(0, e.name.rfind(e.apart ? kApart : kThreads)) + kThreads + "1",
+  if (e.threads > 1)
+    return {e.name.substr(0, e.name.rfind('_')) + kThreadsSuffix + "1",
             e.apart ? 0 : kThreadEfficiency * e.threads};
   if (e.threads == 1) return {};
   double aim = s.aim_batch;

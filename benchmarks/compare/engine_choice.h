@@ -15,8 +15,8 @@ enum class EngineKind { kMujoco, kWorld, kBatch };
 /// batch_<float32|float64>[_energy_safe][_<instruction set>][_ungrouped][_threads<N>|_apart<N>].
 /// Ungrouped: environments stay in the packs that they are put into. With _threads the batch is
 /// large and the wall clock counts, also for one thread: that one is what others are compared with.
-/// Apart: N batches with a share of the robots and one thread each, which know nothing of each
-/// other: what the machine gives to N threads.
+/// Apart: N >= 2 batches with a share of these robots and one thread each, which know nothing of
+/// each other: what the machine gives to N threads.
 struct EngineChoice {
   std::string name;
   EngineKind kind = EngineKind::kMujoco;

@@ -116,9 +116,8 @@ int run(const Options& o) {
 
   const int core = pin(o.core);
   std::printf(
-      "one thread (but for _threads, _apart), core %d, dt = 1 ms, %ld steps x %d repetitions, in "
-      "turns; "
-      "batches of %d robots\n\n",
+      "one thread (but for _threads, _apart), core %d, dt = 1 ms, %ld steps x %d repetitions, "
+      "in turns; batches of %d robots\n\n",
       core, o.settings.steps, o.settings.repetitions, o.settings.robots);
   print_header();
   std::vector<ScenarioResult> results;

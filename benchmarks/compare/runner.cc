@@ -1,7 +1,11 @@
 #include "benchmarks/compare/runner.h"
 
-#include <memory>
-#include <thread>
+#include <stickslip/errors.h>
+
+#include <algorithm>
+#include <chrono>
+#include <future>
+#include <optional>
 #include <vector>
 
 #include "benchmarks/compare/batch_loop.h"
@@ -19,7 +23,11 @@ class SingleRunner : public Runner {
   SingleRunner(const Scenario& s, long steps, More... more)
       : engine_(s, more...), scenario_(&s), steps_(steps) {}
 
-  void run() override { run_episodes(engine_, *scenario_, clock_, steps_, NoObserver{}); }
+  double run() override {
+    const double start = wall_seconds();
+    run_episodes(engine_, *scenario_, clock_, steps_, NoObserver{});
+    return wall_seconds() - start;
+  }
   /// At the beginning of the next episode.
   void mark() override { mark_ = clock_ = {clock_.episode}; }
   void rewind() override { clock_ = mark_; }
@@ -47,38 +55,40 @@ class BatchRunner : public Runner {
   BatchRunner(const EngineChoice& choice, const Scenario& s, const Settings& settings)
       : threads_(choice.threads),
         shared_(choice.wall_clock() ? most_threads(settings) : 1),
-        batches_(choice.apart ? choice.threads : 1),
-        robots_(full_packs(settings.robots * (choice.wall_clock() ? Settings::kLargeBatch : 1) /
-                           batches_)),
-        part_steps_(std::max(
-            kTick, settings.steps * work() / (robots_ * batches_) / shared_ / kTick * kTick)) {
-    const auto its_cores = cores(0);  // its threads inherit them
-    EngineChoice one = choice;
-    if (choice.apart) one.threads = 1;
-    for (int k = 0; k < batches_; ++k)
-      engines_.push_back(std::make_unique<BatchEngine<T>>(s, one, robots_));
+        robots_(settings.robots * (choice.wall_clock() ? Settings::kLargeBatch : 1)),
+        part_steps_(std::max(kTick, settings.steps * work() / robots_ / shared_ / kTick * kTick)) {
+    require(threads_ <= num_cores(), choice.name + " needs a core for each thread; there are " +
+                                         std::to_string(num_cores()));
+    const int batches = choice.apart ? threads_ : 1, share = robots_ / batches;
+    require(share % Settings::kFullPack == 0 && share * batches == robots_,
+            choice.name + ": " + std::to_string(robots_ / Settings::kFullPack) +
+                " full packs of robots cannot be shared out evenly");
+    std::optional<OnCores> of_its_threads;
+    if (threads_ > 0) of_its_threads.emplace(0, threads_);
+    for (int k = 0; k < batches; ++k)
+      engines_.push_back(std::make_unique<BatchEngine<T>>(
+          s, choice, typename BatchEngine<T>::Share{k * share, share, robots_}));
   }
 
   int parts() const override { return threads_ == 1 ? shared_ : 1; }
   std::unique_ptr<OnCores> cores(int part) const override {
     if (threads_ == 0) return nullptr;
-    return std::make_unique<OnCores>(part, threads_);
+    return std::make_unique<OnCores>(part, 1);  // other threads of a batch are pinned by it
   }
   void prepare() override {
     for (auto& engine : engines_) engine->prepare(steps());
   }
-  void run() override {
-    const auto run = [this](BatchEngine<T>& engine) {
-      NoObserver nobody;
-      engine.run(part_steps_ * (shared_ / parts()), nobody);
-    };
-    if (engines_.size() == 1) return run(*engines_.front());
-    std::vector<std::jthread> side_by_side;
+  double run() override {
+    if (engines_.size() == 1) return timed(*engines_.front());
+    std::vector<std::future<double>> side_by_side;
     for (size_t k = 0; k < engines_.size(); ++k)
-      side_by_side.emplace_back([this, run, k] {
+      side_by_side.push_back(std::async(std::launch::async, [this, k] {
         const OnCores its_core(static_cast<int>(k), 1);
-        run(*engines_[k]);
-      });
+        return timed(*engines_[k]);
+      }));
+    double speed = 0;  // shares per second: nobody waits for the slowest
+    for (auto& seconds : side_by_side) speed += 1 / seconds.get();
+    return static_cast<double>(engines_.size()) / speed;
   }
   void mark() override {
     for (auto& engine : engines_) engine->mark();
@@ -87,7 +97,7 @@ class BatchRunner : public Runner {
     for (auto& engine : engines_) engine->rewind();
   }
   void watch(Observer& observer) override {
-    const auto its_cores = cores(0);
+    const auto its_core = cores(0);
     prepare();
     for (auto& engine : engines_) engine->run(steps(), observer);
   }
@@ -95,18 +105,24 @@ class BatchRunner : public Runner {
     for (const auto& engine : engines_) seed = engine->hash(seed);
     return seed;
   }
-  long robot_steps() const override { return steps() * robots(); }
-  int robots() const override { return robots_ * batches_; }
+  long robot_steps() const override { return steps() * robots_; }
+  int robots() const override { return robots_; }
   std::string instruction_set() const override {
     return engines_.front()->batch().instruction_set();
   }
 
  private:
+  static void require(bool holds, const std::string& what) {
+    if (!holds) throw ModelError(what);
+  }
+  double timed(BatchEngine<T>& engine) const {
+    NoObserver nobody;
+    const double start = wall_seconds();
+    engine.run(part_steps_ * (shared_ / parts()), nobody);
+    return wall_seconds() - start;
+  }
   long steps() const { return part_steps_ * shared_; }  // of a repetition
   int work() const { return threads_ > 0 ? Settings::kThreadWork : Settings::kBatchWork; }
-  static int full_packs(int robots) {
-    return std::max(1, robots / Settings::kFullPack) * Settings::kFullPack;
-  }
   static int most_threads(const Settings& settings) {
     int most = 1;
     for (const EngineChoice& e : settings.engines) most = std::max(most, e.threads);
@@ -115,13 +131,16 @@ class BatchRunner : public Runner {
 
   int threads_;  // 0: one, on the core of everybody else
   int shared_;   // cores of the engine with the most threads
-  int batches_;  // one, or as many as threads: apart
-  int robots_;   // of a batch
+  int robots_;   // of all batches
   long part_steps_;
-  std::vector<std::unique_ptr<BatchEngine<T>>> engines_;
+  std::vector<std::unique_ptr<BatchEngine<T>>> engines_;  // one; apart: as many as threads
 };
 
 }  // namespace
+
+double wall_seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 std::unique_ptr<Runner> make_runner(const EngineChoice& e, const Scenario& s,
                                     const Settings& settings) {

@@ -20,6 +20,8 @@ struct Settings {
   static constexpr int kThreadWork = 40;  // instead: long against a move to another core
 };
 
+double wall_seconds();
+
 class Runner {
  public:
   virtual ~Runner() = default;
@@ -28,7 +30,7 @@ class Runner {
   /// What a part runs on as long as it lives; null: where everybody else does.
   virtual std::unique_ptr<OnCores> cores(int) const { return nullptr; }
   virtual void prepare() {}  ///< for the next repetition; not timed
-  virtual void run() = 0;    ///< the next part of a repetition
+  virtual double run() = 0;  ///< the next part of a repetition; returns its wall time [s]
   virtual void mark() = 0;   ///< here the first counted repetition begins
   virtual void rewind() = 0;
   virtual void watch(Observer& observer) = 0;  ///< one repetition, observed
@@ -39,7 +41,8 @@ class Runner {
   virtual std::string instruction_set() const { return ""; }  ///< of a batch
 };
 
-/// Throws ModelError where a batch cannot be made so: another instruction set than the machine has.
+/// Throws ModelError where a batch cannot be made so: another instruction set than the machine has,
+/// more threads than cores, robots that cannot be shared out.
 std::unique_ptr<Runner> make_runner(const EngineChoice& engine, const Scenario& scenario,
                                     const Settings& settings);
 

@@ -69,7 +69,7 @@ std::vector<int> usable_cores() {
 }
 
 ThreadPool::ThreadPool(int threads, bool pin)
-    : cores_(usable_cores()), pin_(pin), process_(getpid()) {
+    : cores_(usable_cores()), pin_(pin), process_(getpid()), shares_(threads) {
   try {
     for (int k = 1; k < threads; ++k) workers_.emplace_back([this, k] { serve(k); });
   } catch (const std::system_error&) {
@@ -112,11 +112,23 @@ void ThreadPool::pin_to_core(int thread) const {
 #endif
 }
 
+void ThreadPool::share_out(long items) {
+  const long n = static_cast<long>(shares_.size());
+  for (long k = 0; k < n; ++k) {
+    shares_[k].next.store(items * k / n, std::memory_order_relaxed);
+    shares_[k].end = items * (k + 1) / n;
+  }
+}
+
 void ThreadPool::take_items(int thread) {
   const StandardRounding rounding;
-  for (long item = next_.fetch_add(1, std::memory_order_relaxed); item < items_;
-       item = next_.fetch_add(1, std::memory_order_relaxed))
-    work_.call(work_.self, thread, item);
+  const int n = static_cast<int>(shares_.size());
+  for (int k = 0; k < n; ++k) {
+    Share& share = shares_[(thread + k) % n];
+    for (long item = share.next.fetch_add(1, std::memory_order_relaxed); item < share.end;
+         item = share.next.fetch_add(1, std::memory_order_relaxed))
+      work_.call(work_.self, thread, item);
+  }
 }
 
 void ThreadPool::serve(int thread) {
@@ -139,9 +151,8 @@ void ThreadPool::serve(int thread) {
 }
 
 void ThreadPool::run(long items, Work work) {
-  items_ = items;
   work_ = work;
-  next_.store(0, std::memory_order_relaxed);
+  share_out(items);
   if (workers_.empty() || items < 2 || forked()) {
     take_items(0);
     return;

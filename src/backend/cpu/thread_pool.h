@@ -13,8 +13,8 @@ std::vector<int> usable_cores();
 
 class ThreadPool {
  public:
-  /// `threads` >= 1 work, the calling one among them. `pin`: each on a core of its own, the caller
-  /// too (while it works).
+  /// `threads` >= 1 work, the calling one among them. `pin`: each but the calling one is bound to a
+  /// core of its own, of those that the process may use now.
   ThreadPool(int threads, bool pin);
   ~ThreadPool();
   ThreadPool(const ThreadPool&) = delete;
@@ -33,6 +33,13 @@ class ThreadPool {
  private:
   void serve(int thread);
   void stop_workers();
+  /// An equal part of the items belongs to each thread, the same in every run: what it works on
+  /// stays in its core's cache. Who is through with his own takes those of others.
+  struct alignas(64) Share {
+    std::atomic<long> next{0};
+    long end = 0;
+  };
+  void share_out(long items);
   void take_items(int thread);
   void pin_to_core(int thread) const;
   bool forked() const;
@@ -44,10 +51,9 @@ class ThreadPool {
   std::mutex mutex_;
   std::condition_variable start_, finish_;
   std::atomic<unsigned long> round_{0};
-  std::atomic<long> next_{0};
   std::atomic<int> busy_{0};
   std::atomic<bool> stop_{false};
-  long items_ = 0;
+  std::vector<Share> shares_;
   Work work_ = {};
 };
 

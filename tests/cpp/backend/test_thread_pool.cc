@@ -54,6 +54,30 @@ TEST(EachItemIsDoneOnceByAThreadOfThePool) {
     }
 }
 
+TEST(EachOfTwoThreadsBeginsWithItsOwnShareInEveryRound) {
+  struct First {
+    std::atomic<long> of[2];
+    static void call(void* self, int thread, long item) {
+      long none = -1;
+      static_cast<First*>(self)->of[thread].compare_exchange_strong(none, item);
+      const auto end = std::chrono::steady_clock::now() + std::chrono::microseconds(20);
+      while (std::chrono::steady_clock::now() < end) {  // so that the other wakes up in time
+      }
+    }
+  } first;
+  ThreadPool pool(2, false);
+  int both = 0;
+  bool own = true;
+  for (int round = 0; round < 200; ++round) {
+    first.of[0] = first.of[1] = -1;
+    pool.run(50, {First::call, &first});
+    own = own && first.of[0] < 25 && (first.of[1] == -1 || first.of[1] >= 25);
+    both += first.of[0] >= 0 && first.of[1] >= 0;
+  }
+  CHECK(own);
+  CHECK(both > 0);
+}
+
 TEST(RoundsFollowEachOther) {
   for (const int threads : kThreads) {
     ThreadPool pool(threads, false);
