@@ -19,9 +19,9 @@ namespace stickslip::benchmarks {
 template <class T>
 class BatchEngine {
  public:
-  /// Robots first, first + 1, ... of `share.robots` of a benchmark: robot r begins with episode r
-  /// and goes on with r + share.robots, and so on. The first episodes are cut short so that after
-  /// one episode's length of steps all phases are there.
+  /// Its robots are `first`, first + 1, ... of the `robots` of a benchmark: robot r begins with
+  /// episode r and goes on with r + robots, and so on. The first episodes are cut short so that
+  /// after one episode's length of steps all phases are there.
   struct Share {
     int first, count, robots;
   };

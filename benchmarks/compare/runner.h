@@ -20,7 +20,7 @@ struct Settings {
   static constexpr int kThreadWork = 40;  // instead: long against a move to another core
 };
 
-double wall_seconds();
+double wall_seconds();  ///< since some moment [s]
 
 class Runner {
  public:
