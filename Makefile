@@ -79,7 +79,7 @@ bench: $(VENV)/bench
 bench-contact: $(VENV)/bench
 	$(BIN)/python benchmarks/contact/run.py $(BENCH)
 
-# Whole tasks, which take long with sanitizers and in emulators; the trot, which is left, runs the same code.
+# Whole tasks of worlds, which take long with sanitizers and in emulators; those of batches, which are left, run the same code.
 LONG_TESTS := physics_test_(tasks|large_steps)
 
 # -O1: with checks in every unrolled kernel, -O2 takes minutes and gigabytes per file.
@@ -90,20 +90,23 @@ sanitize: $(VENV)/tools
 	$(BIN)/ctest --test-dir build/sanitize --output-on-failure -j $(CMAKE_BUILD_PARALLEL_LEVEL) -E '$(LONG_TESTS)'
 
 # Shows that NEON compiles and has the bits of every other instruction set, on a machine without it. The libraries are ARM's wheels.
+.PHONY: arm-tools
+arm-tools:
+	@command -v aarch64-linux-gnu-g++ >/dev/null && command -v qemu-aarch64 >/dev/null || \
+	  { echo "aarch64-linux-gnu-g++ and qemu-aarch64 are needed (Debian and Ubuntu: packages g++-aarch64-linux-gnu, qemu-user)."; exit 1; }
+
 ARM_WHEELS := build/aarch64-wheels
-$(ARM_WHEELS)/installed: $(VENV)/tools
+$(ARM_WHEELS)/installed: $(VENV)/tools | arm-tools
 	rm -rf $(ARM_WHEELS) && mkdir -p $(ARM_WHEELS)
 	grep cmeel $(VENV)/tools.txt > $(ARM_WHEELS)/wanted.txt
 	$(BIN)/python -m pip install -q --target $(ARM_WHEELS) --only-binary=:all: \
 	  --platform manylinux_2_28_aarch64 --platform manylinux_2_17_aarch64 -r $(ARM_WHEELS)/wanted.txt
 	touch $@
 
-test-arm: $(ARM_WHEELS)/installed
-	@command -v aarch64-linux-gnu-g++ >/dev/null && command -v qemu-aarch64 >/dev/null || \
-	  { echo "aarch64-linux-gnu-g++ and qemu-aarch64 are needed (Debian and Ubuntu: packages g++-aarch64-linux-gnu, qemu-user)."; exit 1; }
+test-arm: arm-tools $(ARM_WHEELS)/installed
 	$(BIN)/cmake -S . -B build/aarch64 -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja -DPython_EXECUTABLE=$(abspath $(BIN))/python \
 	  -DCMAKE_TOOLCHAIN_FILE=cmake/aarch64.cmake -DSTICKSLIP_CMEEL_PREFIX=$(abspath $(ARM_WHEELS))/cmeel.prefix \
-	  -DSTICKSLIP_TESTS=ON
+	  -DSTICKSLIP_TESTS=ON -DSTICKSLIP_WERROR=ON
 	$(BIN)/cmake --build build/aarch64
 	$(BIN)/ctest --test-dir build/aarch64 --output-on-failure -j $(CMAKE_BUILD_PARALLEL_LEVEL) -E '$(LONG_TESTS)'
 

@@ -39,7 +39,7 @@ if(STICKSLIP_SANITIZE)
   target_compile_options(stickslip_flags_any_machine INTERFACE -fsanitize=address,undefined -fno-omit-frame-pointer -fno-sanitize-recover=all)
   target_link_options(stickslip_flags_any_machine INTERFACE -fsanitize=address,undefined)
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-    # Those of addresses as calls: written out in unrolled kernels they double the minutes that these take to compile.
+    # Checks of addresses as calls: written out in unrolled kernels they double the minutes that these take to compile.
     target_compile_options(stickslip_flags_any_machine INTERFACE "SHELL:--param asan-instrumentation-with-call-threshold=0")
   endif()
 endif()

@@ -53,6 +53,9 @@ BatchEngine<T>::BatchEngine(const Scenario& scenario, const EngineChoice& choice
       status_(static_cast<const std::uint32_t*>(batch_.array(BatchField::kStatus).data)),
       clocks_(num_envs_),
       last_(static_cast<size_t>(num_envs_) * joints_),
+      next_q_(static_cast<size_t>(num_envs_) * nq_),
+      next_u_(static_cast<size_t>(num_envs_) * nu_),
+      next_episode_(num_envs_, -1),
       target_(joints_),
       ruler_(std::make_unique<World>()) {
   if (choice.integrator == Integrator::kSemiImplicit)
@@ -61,8 +64,8 @@ BatchEngine<T>::BatchEngine(const Scenario& scenario, const EngineChoice& choice
     throw std::logic_error("targets of a task that ends when still cannot be laid out");
   ruler_->add_robot(scenario.model);
   finished_.reserve(num_envs_);
-  start_q_.resize(static_cast<size_t>(num_envs_) * nq_);
-  start_u_.resize(static_cast<size_t>(num_envs_) * nu_);
+  start_q_.resize(next_q_.size());
+  start_u_.resize(next_u_.size());
   for (int e = 0; e < num_envs_; ++e) clocks_[e].episode = share.first + e - robots_;
 
   prepare(scenario.episode_steps);
@@ -91,7 +94,22 @@ long BatchEngine<T>::next_event() const {
 
 template <class T>
 void BatchEngine<T>::prepare(long steps) {
-  if (!moving()) return;
+  for (int e = 0; e < num_envs_; ++e) lay_out_start(e);
+  if (moving()) lay_out_targets(steps);
+}
+
+template <class T>
+void BatchEngine<T>::lay_out_start(int e) {
+  const int episode = clocks_[e].episode + robots_;
+  if (next_episode_[e] == episode) return;
+  const size_t k = e;
+  scenario_->initial_state(episode, {&next_q_[k * nq_], static_cast<size_t>(nq_)},
+                           {&next_u_[k * nu_], static_cast<size_t>(nu_)});
+  next_episode_[e] = episode;
+}
+
+template <class T>
+void BatchEngine<T>::lay_out_targets(long steps) {
   std::vector<EpisodeClock> clocks = clocks_;
   script_.clear();
   scripted_ = 0;
@@ -116,10 +134,11 @@ void BatchEngine<T>::reset_finished() {
   for (int e = 0; e < num_envs_; ++e) {
     EpisodeClock& clock = clocks_[e];
     if (!clock.over()) continue;
+    lay_out_start(e);  // done, unless it is its second episode since `prepare`
     begin(clock);
-    const size_t k = finished_.size();
-    scenario_->initial_state(clock.episode, {&start_q_[k * nq_], static_cast<size_t>(nq_)},
-                             {&start_u_[k * nu_], static_cast<size_t>(nu_)});
+    const size_t k = finished_.size(), from = e;
+    std::copy_n(&next_q_[from * nq_], nq_, &start_q_[k * nq_]);
+    std::copy_n(&next_u_[from * nu_], nu_, &start_u_[k * nu_]);
     finished_.push_back(e);
     if (moving()) continue;
     scenario_->target(clock.episode, 0, target_);

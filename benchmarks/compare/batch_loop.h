@@ -29,8 +29,8 @@ class BatchEngine {
 
   const Batch& batch() const { return batch_; }
 
-  /// Lays out the targets of the next `steps` (a multiple of kTick), as a policy hands them over:
-  /// not timed, as no policy is.
+  /// Lays out what the next `steps` (a multiple of kTick) are given from outside: targets, as a
+  /// policy hands them over, and the states that episodes begin with. Not timed, as no policy is.
   void prepare(long steps);
   /// Takes these steps: targets, steps, resets.
   template <class Observer>
@@ -48,6 +48,9 @@ class BatchEngine {
 
   long next_event() const;
   void begin(EpisodeClock& clock) const;
+  void lay_out_targets(long steps);
+  /// The state that the next episode of robot e begins with.
+  void lay_out_start(int e);
   void reset_finished();
   void set_targets(const T* targets) { std::copy_n(targets, num_envs_ * joints_, targets_); }
   void find_still();
@@ -75,9 +78,11 @@ class BatchEngine {
   const std::uint32_t* status_;
 
   std::vector<EpisodeClock> clocks_;
-  std::vector<T> script_;  // targets of the coming ticks, (ticks, num_envs, joints)
-  size_t scripted_ = 0;    // how far it was followed
-  std::vector<T> last_;    // those of the last tick that was laid out
+  std::vector<T> script_;                // targets of the coming ticks, (ticks, num_envs, joints)
+  size_t scripted_ = 0;                  // how far it was followed
+  std::vector<T> last_;                  // those of the last tick that was laid out
+  std::vector<double> next_q_, next_u_;  // the next start of each robot, (num_envs, nq or nu)
+  std::vector<int> next_episode_;        // which episode's
   // of reset_finished and observe, here so that a step allocates nothing
   std::vector<std::int64_t> finished_;
   std::vector<double> start_q_, start_u_, target_;

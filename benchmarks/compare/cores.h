@@ -4,8 +4,8 @@
 
 namespace stickslip::benchmarks {
 
-/// Pins this thread, and threads it makes from now on, to a core; -2: core 1 where there is one,
-/// else 0; -1: no pinning. Returns the core, or -1.
+/// Pins this thread, and threads it makes from now on, to a core; -2: the second of those that this
+/// process may use, or the only one; -1: no pinning. Returns the core, or -1.
 int pin(int core);
 
 /// How many cores this process had at its start; at least 1.

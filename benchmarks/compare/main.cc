@@ -1,5 +1,6 @@
 // stickslip and MuJoCo on the same tasks, interleaved, on one core. README.md has the rules.
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -27,7 +28,7 @@ constexpr const char* kUsage =
     "  --repetitions N     counted ones; one more warms up (default 40)\n"
     "  --robots FOLDER     example-robot-data's robots folder: adds other robots than ANYmal\n"
     "  --urdf FILE         ANYmal's description\n"
-    "  --core N            pin to this core (default 1 where there is one, else 0; -1: none)\n"
+    "  --core N            pin to this core (default: the second of those there are; -1: none)\n"
     "  --no-statistics     times only; nothing is checked\n"
     "  --check             fail (exit status 1) where an aim is missed, too\n"
     "  --json FILE         write the results there too\n";
@@ -122,18 +123,20 @@ int run(const Options& o) {
   print_header();
   std::vector<ScenarioResult> results;
   bool good = true;
-  double least_share = 1, disagreement = 0;
+  double least_share = NAN, disagreement = 0;
   for (const Scenario& s : scenarios) {
     results.push_back(measure(s, o.settings));
     print_result(results.back());
     good = print_faults(results.back()) && good;
-    least_share = std::min(least_share, results.back().core_share);
+    least_share = std::fmin(least_share, results.back().core_share);
     disagreement = std::max(disagreement, results.back().disagreement);
   }
   print_second_opinions(results);
   if (o.check) good = print_missed_aims(results) && good;
-  std::printf("\nmodels agree to %.1e; this thread had the core at least %.0f %% of the time\n",
-              disagreement, 100 * least_share);
+  std::printf("\nmodels agree to %.1e", disagreement);
+  if (std::isfinite(least_share))
+    std::printf("; this thread had the core at least %.0f %% of the time", 100 * least_share);
+  std::printf("\n");
   if (!o.json.empty()) {
     std::ofstream file(o.json);
     file << to_json(results, o.settings);

@@ -3,10 +3,12 @@
 #include <stickslip/errors.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
 #include <numeric>
+#include <thread>
 
 #include "benchmarks/compare/agreement.h"
 
@@ -33,7 +35,7 @@ struct Contestant {
 };
 
 struct Seconds {
-  double cpu = 0, wall = 0;  // of those that are pinned
+  double cpu = 0, wall = 0;  // of engines with one thread
 };
 
 /// One repetition.
@@ -51,6 +53,8 @@ void time(Contestant& c, bool counted, Seconds& total) {
     const double share = static_cast<double>(c.runner->robot_steps()) / parts;
     speed += share / (c.choice.wall_clock() ? took : worked) / parts;
   }
+  // Threads of a batch stay awake for a moment, which is not the next engine's to pay for.
+  if (c.choice.wall_clock()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   if (!counted) return;
   c.microseconds.push_back(1e6 / speed);
   c.hash = c.runner->hash(c.hash);
@@ -96,17 +100,42 @@ std::vector<std::string> faults_of(const Measurement& m, const Scenario& s, bool
   return faults;
 }
 
-/// Batches that differ in instruction set or threads only must end in the same bits.
-void compare_hashes(std::vector<Measurement>& engines) {
-  const auto same_work = [](const Measurement& a, const Measurement& b) {
-    return a.engine.kind == EngineKind::kBatch && b.engine.kind == EngineKind::kBatch &&
-           a.engine.precision == b.engine.precision && a.engine.integrator == b.engine.integrator &&
-           a.robots == b.robots;
-  };
-  for (size_t i = 0; i < engines.size(); ++i)
-    for (size_t k = 0; k < i; ++k)
-      if (same_work(engines[i], engines[k]) && engines[i].findings.hash != engines[k].findings.hash)
-        engines[i].faults.push_back("it ends in other bits than " + engines[k].engine.name);
+/// The first batch among `engines` that differs from m in instruction set or threads only; null:
+/// none. They must end in the same bits.
+const Measurement* twin_of(const Measurement& m, const std::vector<Measurement>& engines) {
+  for (const Measurement& other : engines)
+    if (m.engine.kind == EngineKind::kBatch && other.engine.kind == EngineKind::kBatch &&
+        m.engine.precision == other.engine.precision &&
+        m.engine.integrator == other.engine.integrator && m.robots == other.robots &&
+        m.microseconds.size() == other.microseconds.size())
+      return &other;
+  return nullptr;
+}
+
+/// What c was timed at, and by `earlier` engines or a second look what it did.
+Measurement measurement_of(Contestant& c, const std::vector<Measurement>& earlier,
+                           const Scenario& scenario, bool statistics) {
+  Measurement m{c.choice,
+                c.runner->robots(),
+                c.runner->robot_steps(),
+                c.runner->instruction_set(),
+                c.microseconds,
+                c.hash,
+                {},
+                {}};
+  const Measurement* twin = twin_of(m, earlier);
+  const bool same_bits = twin && twin->hash == m.hash;
+  if (statistics && same_bits) {
+    m.findings = twin->findings;
+    m.faults = faults_of(m, scenario, true);
+  } else if (statistics) {
+    Observer observer(scenario, c.choice.tolerance());
+    const bool repeats = watch(c, observer) == c.hash;
+    m.findings = observer.finish();
+    m.faults = faults_of(m, scenario, repeats);
+  }
+  if (twin && !same_bits) m.faults.push_back("it ends in other bits than " + twin->engine.name);
+  return m;
 }
 
 }  // namespace
@@ -150,38 +179,25 @@ ScenarioResult measure(const Scenario& scenario, const Settings& settings) {
     try {
       contestants.push_back({choice, make_runner(choice, scenario, settings), 0, {}});
     } catch (const ModelError& error) {  // such as an instruction set that is not there
-      result.engines.push_back({choice, 0, 0, "", {}, {}, {error.what()}});
+      result.engines.push_back({choice, 0, 0, "", {}, 0, {}, {error.what()}});
     }
   }
 
   Seconds total;
-  for (int rep = 0; rep <= settings.repetitions; ++rep)  // 0 warms up
-    for (Contestant& c : contestants) {
-      if (rep == 1) c.runner->mark();
-      time(c, rep > 0, total);
-    }
-  result.core_share = total.wall > 0 ? total.cpu / total.wall : 1;
+  for (int rep = 0; rep <= settings.repetitions; ++rep) {  // 0 warms up
+    if (rep == 1)
+      for (Contestant& c : contestants) c.runner->mark();
+    for (int round = 0; round < Settings::kThreadRounds; ++round)
+      for (Contestant& c : contestants)
+        if (round == 0 || c.choice.wall_clock()) time(c, rep > 0, total);
+  }
+  if (total.wall > 0) result.core_share = total.cpu / total.wall;
 
   for (Contestant& c : contestants) {
-    Measurement m{c.choice,
-                  c.runner->robots(),
-                  c.runner->robot_steps(),
-                  c.runner->instruction_set(),
-                  c.microseconds,
-                  {},
-                  {}};
-    if (settings.statistics) {
-      Observer observer(scenario, c.choice.tolerance());
-      const std::uint64_t hash = watch(c, observer);
-      m.findings = observer.finish();
-      m.findings.hash = hash;
-      m.faults = faults_of(m, scenario, hash == c.hash);
-    }
+    result.engines.push_back(measurement_of(c, result.engines, scenario, settings.statistics));
     if (!(result.disagreement < kAgreement))
-      m.faults.push_back("the engines do not simulate the same robot");
-    result.engines.push_back(std::move(m));
+      result.engines.back().faults.push_back("the engines do not simulate the same robot");
   }
-  if (settings.statistics) compare_hashes(result.engines);
   return result;
 }
 

@@ -1,5 +1,7 @@
 // Times the engines on a scenario, in turns, and then watches the same runs.
 #pragma once
+#include <cmath>
+
 #include "benchmarks/compare/runner.h"
 
 namespace stickslip::benchmarks {
@@ -10,6 +12,7 @@ struct Measurement {
   long robot_steps = 0;              ///< of a repetition
   std::string instruction_set;       ///< of a batch
   std::vector<double> microseconds;  ///< per robot-step, one per repetition
+  std::uint64_t hash = 0;            ///< over the final states of the repetitions
   Findings findings;
   std::vector<std::string> faults;  ///< why the result does not count; empty: it does
 
@@ -21,7 +24,7 @@ struct Measurement {
 struct ScenarioResult {
   const Scenario* scenario;
   double disagreement = 0;  ///< of the models, see model_disagreement
-  double core_share = 1;    ///< share of the wall clock that a single thread had its core
+  double core_share = NAN;  ///< share of the wall clock that a single thread had its core
   std::vector<Measurement> engines;
 
   const Measurement* find(const std::string& engine) const;

@@ -38,7 +38,6 @@ struct Findings {
   long exploded = 0;            ///< steps with a velocity above 1000 or not finite
   long failed = 0;              ///< steps in which the engine reported a bad state
   double energy_settled = 0, energy_at_end = 0;  ///< means over episodes [J]
-  std::uint64_t hash = 0;                        ///< of all final states of the observed runs
 };
 
 /// Collects Findings from an engine that has observe(Snapshot&).

@@ -106,13 +106,16 @@ def cells(e: dict) -> list[str]:
     name = e["engine"] + (" **FAILED**: " + "; ".join(e["faults"]) if e["faults"] else "")
     if not e["us_per_repetition"]:  # it could not be run
         return [name, *[""] * 9]
+    watched = e["steps"] > 0  # not with --no-statistics
     ours = "max_residual_m_per_s" in e
     energy = f"{e['energy_settled_J']:.1f} → {e['energy_at_end_J']:.1f}" if e["energy_settled_J"] else ""
-    depth = f"{1e3 * e['mean_penetration_m']:.4f} / {1e3 * e['max_penetration_m']:.3f}" if e["contacts"] else ""
+    depth = (
+        f"{1e3 * e['mean_penetration_m']:.4f} / {1e3 * e['max_penetration_m']:.3f}" if watched and e["contacts"] else ""
+    )
     residual = (
         f"{e['residual_99_99_m_per_s']:.0e} / {e['max_residual_m_per_s']:.0e} "
         f"({e['share_above_tolerance']:.0e} > {e['residual_tolerance_m_per_s']:.0e})"
-        if ours
+        if ours and watched
         else ""
     )
     return [
@@ -121,8 +124,8 @@ def cells(e: dict) -> list[str]:
         f"{e['robot_steps_per_s'] / 1e6:.3f} M",
         f"{e['ratio']:.2f}" if e["ratio"] else "",
         f"{e['target_ratio']:.3g}" if e["target_ratio"] else "",
-        f"{e['contacts']:.2f}",
-        f"{e['pushing_contacts']:.2f}",
+        f"{e['contacts']:.2f}" if watched else "",
+        f"{e['pushing_contacts']:.2f}" if watched else "",
         depth,
         energy,
         residual,

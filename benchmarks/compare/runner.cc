@@ -3,7 +3,9 @@
 #include <stickslip/errors.h>
 
 #include <algorithm>
+#include <barrier>
 #include <chrono>
+#include <cmath>
 #include <future>
 #include <optional>
 #include <vector>
@@ -54,11 +56,16 @@ class BatchRunner : public Runner {
  public:
   BatchRunner(const EngineChoice& choice, const Scenario& s, const Settings& settings)
       : threads_(choice.threads),
-        shared_(choice.wall_clock() ? most_threads(settings) : 1),
+        compared_cores_(choice.wall_clock() ? most_threads(settings) : 1),
         robots_(settings.robots * (choice.wall_clock() ? Settings::kLargeBatch : 1)),
-        part_steps_(std::max(kTick, settings.steps * work() / robots_ / shared_ / kTick * kTick)) {
+        part_steps_(kTick * std::max(1l, std::lround(double(settings.steps) * work() / robots_ /
+                                                     compared_cores_ / kTick))) {
     require(threads_ <= num_cores(), choice.name + " needs a core for each thread; there are " +
                                          std::to_string(num_cores()));
+    require(threads_ <= 1 || threads_ == compared_cores_,
+            choice.name +
+                ": another number of threads is in the same run; one is compared with "
+                "one thread on its cores");
     const int batches = choice.apart ? threads_ : 1, share = robots_ / batches;
     require(share % Settings::kFullPack == 0 && share * batches == robots_,
             choice.name + ": " + std::to_string(robots_ / Settings::kFullPack) +
@@ -70,7 +77,7 @@ class BatchRunner : public Runner {
           s, choice, typename BatchEngine<T>::Share{k * share, share, robots_}));
   }
 
-  int parts() const override { return threads_ == 1 ? shared_ : 1; }
+  int parts() const override { return threads_ == 1 ? compared_cores_ : 1; }
   std::unique_ptr<OnCores> cores(int part) const override {
     if (threads_ == 0) return nullptr;
     return std::make_unique<OnCores>(part, 1);  // other threads of a batch are pinned by it
@@ -80,10 +87,12 @@ class BatchRunner : public Runner {
   }
   double run() override {
     if (engines_.size() == 1) return timed(*engines_.front());
+    std::barrier all_there(static_cast<std::ptrdiff_t>(engines_.size()));
     std::vector<std::future<double>> side_by_side;
     for (size_t k = 0; k < engines_.size(); ++k)
-      side_by_side.push_back(std::async(std::launch::async, [this, k] {
+      side_by_side.push_back(std::async(std::launch::async, [this, k, &all_there] {
         const OnCores its_core(static_cast<int>(k), 1);
+        all_there.arrive_and_wait();
         return timed(*engines_[k]);
       }));
     double speed = 0;  // shares per second: nobody waits for the slowest
@@ -118,10 +127,10 @@ class BatchRunner : public Runner {
   double timed(BatchEngine<T>& engine) const {
     NoObserver nobody;
     const double start = wall_seconds();
-    engine.run(part_steps_ * (shared_ / parts()), nobody);
+    engine.run(part_steps_ * (compared_cores_ / parts()), nobody);
     return wall_seconds() - start;
   }
-  long steps() const { return part_steps_ * shared_; }  // of a repetition
+  long steps() const { return part_steps_ * compared_cores_; }  // of a repetition
   int work() const { return threads_ > 0 ? Settings::kThreadWork : Settings::kBatchWork; }
   static int most_threads(const Settings& settings) {
     int most = 1;
@@ -129,9 +138,9 @@ class BatchRunner : public Runner {
     return std::min(most, num_cores());
   }
 
-  int threads_;  // 0: one, on the core of everybody else
-  int shared_;   // cores of the engine with the most threads
-  int robots_;   // of all batches
+  int threads_;         // 0: one, on the core of everybody else
+  int compared_cores_;  // cores of the engine with the most threads
+  int robots_;          // of all batches
   long part_steps_;
   std::vector<std::unique_ptr<BatchEngine<T>>> engines_;  // one; apart: as many as threads
 };

@@ -16,8 +16,10 @@ struct Settings {
   bool statistics = true;
 
   static constexpr int kFullPack = 16;  // of the widest instructions
-  static constexpr int kBatchWork = 16, kLargeBatch = 16;
-  static constexpr int kThreadWork = 40;  // instead: long against a move to another core
+  static constexpr int kBatchWork = 16, kLargeBatch = 32;
+  // Where threads are compared: long against a move to another core, and more rounds, because a
+  // wall clock knows more interruptions.
+  static constexpr int kThreadWork = 40, kThreadRounds = 3;
 };
 
 double wall_seconds();  ///< since some moment [s]
@@ -30,8 +32,10 @@ class Runner {
   /// What a part runs on as long as it lives; null: where everybody else does.
   virtual std::unique_ptr<OnCores> cores(int) const { return nullptr; }
   virtual void prepare() {}  ///< for the next repetition; not timed
-  virtual double run() = 0;  ///< the next part of a repetition; returns its wall time [s]
-  virtual void mark() = 0;   ///< here the first counted repetition begins
+  /// The next part of a repetition; returns its wall time [s], of batches apart that in which they
+  /// would do it all at the sum of their speeds.
+  virtual double run() = 0;
+  virtual void mark() = 0;  ///< here the first counted repetition begins
   virtual void rewind() = 0;
   virtual void watch(Observer& observer) = 0;  ///< one repetition, observed
 

@@ -22,9 +22,11 @@ enum class Precision { kFloat32, kFloat64 };
 struct BatchOptions {
   int num_envs = 1;  ///< >= 1
   Precision precision = Precision::kFloat32;
-  int num_threads = 0;  ///< 0: one per core that this process may use
-  /// Binds worker k = 1, 2, ... to the k-th of those cores; the calling thread, the first worker,
-  /// is left free.
+  /// 0: one per core (hardware thread) that the calling thread may run on, at most one per pack.
+  int num_threads = 0;
+  /// Binds thread k = 1, 2, ... to core k of those, counted from 0 and over again where they are
+  /// fewer; the calling thread, number 0, is left free. Batches that step at the same time share
+  /// these cores.
   bool pin_threads = false;
   /// "avx512", "avx2", "neon"; empty: what STICKSLIP_ISA says, else the widest the machine has.
   std::string instruction_set;

@@ -45,8 +45,8 @@ class Batch(Profiled):
     world: gives robot, gravity, ground, materials, options, gains, forces and present state; it is not touched, and may go.
     num_envs: environments, at least 1.
     dtype: "float32" (fastest) or "float64" (the bits of a World).
-    num_threads: 0 for one per core that this process may use. pin_threads: bind each but the calling one
-        to a core.
+    num_threads: 0 for one per core (hardware thread) that the calling thread may run on, at most one per pack.
+    pin_threads: bind each but the calling one to one of these cores.
     instruction_set: "avx512", "avx2" or "neon"; None for what STICKSLIP_ISA says, else the widest that the machine has.
     regroup_every: steps, at least, after which environments that touch the ground with the same points are brought together
         in packs, up to 16 times as many while little changes; 0 for never. Shows in speed only.

@@ -74,9 +74,11 @@ def scattered_states(num_envs: int, seed: int = 7) -> tuple[np.ndarray, np.ndarr
     return q, u
 
 
-def scattered(num_envs: int, dtype: str = "float64", num_threads: int = 1, **options) -> ss.Batch:
+def scattered(
+    num_envs: int, dtype: str = "float64", num_threads: int = 1, pin_threads: bool = False, **options
+) -> ss.Batch:
     """ANYmals in `scattered_states`."""
-    batch = ss.Batch(anymal(**options), num_envs, dtype, num_threads)
+    batch = ss.Batch(anymal(**options), num_envs, dtype, num_threads, pin_threads=pin_threads)
     batch.reset(None, *scattered_states(num_envs))
     return batch
 

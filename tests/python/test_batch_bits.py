@@ -96,13 +96,13 @@ def test_float32_stays_near_float64() -> None:
 
 @pytest.mark.parametrize("dtype", NUMBERS)
 @pytest.mark.parametrize("integrator", INTEGRATORS)
-def test_number_of_environments_and_threads_change_no_bit(dtype: str, integrator: str) -> None:
+def test_number_of_environments_and_threads_and_their_pinning_change_no_bit(dtype: str, integrator: str) -> None:
     everything = scattered(33, dtype, integrator=integrator)
     run(everything, 200)
     assert everything.contact_active.any()
     for num_envs in (1, 5, 16, 17, 33):
-        for num_threads in (1, 2, 3):
-            batch = scattered(num_envs, dtype, num_threads, integrator=integrator)
+        for num_threads, pin_threads in ((1, False), (2, True), (3, False)):
+            batch = scattered(num_envs, dtype, num_threads, pin_threads, integrator=integrator)
             run(batch, 200)
             assert_same_bits(
                 batch, everything, ("q", "u", *OUTPUTS), slice(num_envs), f"{num_envs}, {num_threads} threads"

@@ -83,7 +83,7 @@ def test_interrupt_ends_a_long_call(ball: ss.Model) -> None:
     assert batch.step() == ss.StepStatus.OK
 
 
-def test_forked_process_steps_on_with_the_same_bits() -> None:
+def test_forked_process_steps_on_with_the_same_bits_and_can_let_go_of_the_batch() -> None:
     batch = ss.Batch(anymal(), 40, "float64", num_threads=2)
     batch.reset(None, *scattered_states(40))
     batch.step(5)
@@ -91,13 +91,17 @@ def test_forked_process_steps_on_with_the_same_bits() -> None:
     batch.step(5)
     expected = batch.q.tobytes()
     batch.load_state(start)
+    time.sleep(0.01)  # the batch's thread sleeps now
     read, write = os.pipe()
     child = os.fork()
     if child == 0:  # nothing of pytest may run here
+        signal.alarm(60)
         batch.step(5)
-        os.write(write, b"1" if batch.q.tobytes() == expected else b"0")
+        same = batch.q.tobytes() == expected
+        del batch
+        os.write(write, b"1" if same else b"0")
         os._exit(0)
+    os.close(write)
     os.waitpid(child, 0)
     assert os.read(read, 1) == b"1"
     os.close(read)
-    os.close(write)

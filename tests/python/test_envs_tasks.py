@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import runpy
 import warnings
 from pathlib import Path
@@ -111,8 +112,22 @@ def test_unknown_arguments_are_named_beside_those_of_the_task() -> None:
         Falling(3, foo=1)
 
 
+def test_batch_regroups_only_where_it_is_asked_for(monkeypatch) -> None:
+    asked = []
+    make = ss.Batch.__init__
+
+    @functools.wraps(make)
+    def watched(self, *args, **options) -> None:
+        asked.append(options["regroup_every"])
+        make(self, *args, **options)
+
+    monkeypatch.setattr(ss.Batch, "__init__", watched)
+    Falling(3)
+    Falling(3, regroup_every=8)
+    assert asked == [0, 8]
+
+
 def test_regrouping_of_the_batch_shows_in_no_observation() -> None:
-    # Off unless asked for.
     module = SimpleNamespace(**runpy.run_path(str(ROOT / "examples" / "write_your_own_task.py")))
     task = next(
         x for x in vars(module).values() if isinstance(x, type) and issubclass(x, VectorTask) and x is not VectorTask

@@ -218,7 +218,7 @@ backend::EnvArrays Batch::Impl::env_arrays() {
   return a;
 }
 
-void Batch::Impl::step_pack(void* self, int thread, long pack) {
+void Batch::Impl::step_pack(void* self, int thread, long pack) noexcept {
   Impl& b = *static_cast<Impl*>(self);
   Worker& w = *b.workers[thread];
   backend::PackInertias inertias;
@@ -232,7 +232,7 @@ void Batch::Impl::step_pack(void* self, int thread, long pack) {
   if (bits) b.bits_.fetch_or(bits, std::memory_order_relaxed);
 }
 
-void Batch::Impl::regroup_block(void* self, int, long block) {
+void Batch::Impl::regroup_block(void* self, int, long block) noexcept {
   Impl& b = *static_cast<Impl*>(self);
   const auto bodies = b.bodies.carried();
   const backend::LaneRows carried[] = {

@@ -90,8 +90,8 @@ struct Batch::Impl {
   backend::EnvArrays running_;
   int running_steps_ = 0;
   std::atomic<std::uint32_t> bits_{0};
-  static void regroup_block(void* self, int thread, long block);
-  static void step_pack(void* self, int thread, long pack);
+  static void regroup_block(void* self, int thread, long block) noexcept;
+  static void step_pack(void* self, int thread, long pack) noexcept;
 };
 
 }  // namespace stickslip

@@ -70,6 +70,7 @@ std::vector<int> usable_cores() {
 
 ThreadPool::ThreadPool(int threads, bool pin)
     : cores_(usable_cores()), pin_(pin), process_(getpid()), shares_(threads) {
+  workers_.reserve(threads - 1);
   try {
     for (int k = 1; k < threads; ++k) workers_.emplace_back([this, k] { serve(k); });
   } catch (const std::system_error&) {
@@ -83,8 +84,11 @@ ThreadPool::ThreadPool(int threads, bool pin)
 bool ThreadPool::forked() const { return process_ != getpid(); }
 
 ThreadPool::~ThreadPool() {
-  if (forked()) {  // handles of threads that are not here: they can be neither joined nor destroyed
+  if (forked()) {
+    // Handles of threads that are not here can be neither joined nor destroyed, and what they sleep
+    // on, for who destroys it waits for them.
     new std::vector<std::thread>(std::move(workers_));
+    static_cast<void>(beds_.release());
     return;
   }
   stop_workers();
@@ -92,11 +96,10 @@ ThreadPool::~ThreadPool() {
 
 void ThreadPool::stop_workers() {
   {
-    const std::lock_guard lock(mutex_);
+    const std::lock_guard lock(beds_->mutex);
     stop_ = true;
-    ++round_;
   }
-  start_.notify_all();
+  beds_->start.notify_all();
   for (std::thread& t : workers_) t.join();
   workers_.clear();
 }
@@ -115,8 +118,9 @@ void ThreadPool::pin_to_core(int thread) const {
 void ThreadPool::share_out(long items) {
   const long n = static_cast<long>(shares_.size());
   for (long k = 0; k < n; ++k) {
-    shares_[k].next.store(items * k / n, std::memory_order_relaxed);
-    shares_[k].end = items * (k + 1) / n;
+    // Rounded up: of few items the first are the calling thread's, which is awake.
+    shares_[k].next.store((items * k + n - 1) / n, std::memory_order_relaxed);
+    shares_[k].end = (items * (k + 1) + n - 1) / n;
   }
 }
 
@@ -125,27 +129,32 @@ void ThreadPool::take_items(int thread) {
   const int n = static_cast<int>(shares_.size());
   for (int k = 0; k < n; ++k) {
     Share& share = shares_[(thread + k) % n];
+    if (share.next.load(std::memory_order_relaxed) >= share.end) continue;  // leaves the line alone
     for (long item = share.next.fetch_add(1, std::memory_order_relaxed); item < share.end;
          item = share.next.fetch_add(1, std::memory_order_relaxed))
       work_.call(work_.self, thread, item);
   }
 }
 
+/// False: there is none any more.
+bool ThreadPool::wait_for_round(std::uint64_t seen) {
+  const auto called = [&] { return stop_ || gate_.admits(seen); };
+  if (!wait_awake(called)) {
+    std::unique_lock lock(beds_->mutex);
+    beds_->start.wait(lock, called);
+  }
+  return !stop_;
+}
+
 void ThreadPool::serve(int thread) {
   if (pin_) pin_to_core(thread);
-  unsigned long seen = 0;
-  for (;;) {
-    const auto called = [&] { return round_.load(std::memory_order_acquire) != seen; };
-    if (!wait_awake(called)) {
-      std::unique_lock lock(mutex_);
-      start_.wait(lock, called);
-    }
-    ++seen;
-    if (stop_) return;
+  std::uint64_t seen = 0;
+  while (wait_for_round(seen)) {
+    if (!gate_.enter(seen)) continue;
     take_items(thread);
-    if (busy_.fetch_sub(1, std::memory_order_acq_rel) == 1) {
-      const std::lock_guard lock(mutex_);
-      finish_.notify_one();
+    if (gate_.leave()) {
+      const std::lock_guard lock(beds_->mutex);
+      beds_->finish.notify_one();
     }
   }
 }
@@ -157,17 +166,17 @@ void ThreadPool::run(long items, Work work) {
     take_items(0);
     return;
   }
-  busy_.store(static_cast<int>(workers_.size()), std::memory_order_relaxed);
   {
-    const std::lock_guard lock(mutex_);
-    round_.fetch_add(1, std::memory_order_release);
+    const std::lock_guard lock(beds_->mutex);
+    gate_.open();
   }
-  start_.notify_all();
+  beds_->start.notify_all();
   take_items(0);
-  const auto done = [&] { return busy_.load(std::memory_order_acquire) == 0; };
+  gate_.close();
+  const auto done = [&] { return gate_.empty(); };
   if (!wait_awake(done)) {
-    std::unique_lock lock(mutex_);
-    finish_.wait(lock, done);
+    std::unique_lock lock(beds_->mutex);
+    beds_->finish.wait(lock, done);
   }
 }
 

@@ -2,19 +2,23 @@
 #pragma once
 #include <atomic>
 #include <condition_variable>
+#include <memory>
 #include <mutex>
 #include <thread>
 #include <vector>
 
+#include "backend/cpu/round_gate.h"
+
 namespace stickslip::backend {
 
-/// Cores that this process may use.
+/// Cores (hardware threads) that the calling thread may run on.
 std::vector<int> usable_cores();
 
 class ThreadPool {
  public:
-  /// `threads` >= 1 work, the calling one among them. `pin`: each but the calling one is bound to a
-  /// core of its own, of those that the process may use now.
+  /// `threads` >= 1 work, the calling one among them. `pin`: thread k >= 1 is bound to core k,
+  /// counted from 0, of usable_cores() now, and to core k - n where there are n <= k; it stays free
+  /// where that core is taken from the process meanwhile.
   ThreadPool(int threads, bool pin);
   ~ThreadPool();
   ThreadPool(const ThreadPool&) = delete;
@@ -22,16 +26,17 @@ class ThreadPool {
 
   int size() const { return static_cast<int>(workers_.size()) + 1; }
 
-  /// Calls call(self, thread, item) for each item 0 .. items - 1, each once, and returns when all
-  /// are done. It must not throw.
   struct Work {
-    void (*call)(void* self, int thread, long item);
+    void (*call)(void* self, int thread, long item) noexcept;
     void* self;
   };
+  /// Calls work.call(work.self, thread, item) for each item 0 .. items - 1, each once, and returns
+  /// when all are done. One round at a time, and none from within a call.
   void run(long items, Work work);
 
  private:
   void serve(int thread);
+  bool wait_for_round(std::uint64_t seen);
   void stop_workers();
   /// An equal part of the items belongs to each thread, the same in every run: what it works on
   /// stays in its core's cache. Who is through with his own takes those of others.
@@ -48,10 +53,13 @@ class ThreadPool {
   std::vector<int> cores_;
   bool pin_;
   long process_;
-  std::mutex mutex_;
-  std::condition_variable start_, finish_;
-  std::atomic<unsigned long> round_{0};
-  std::atomic<int> busy_{0};
+  /// Where who has waited awake for too long sleeps.
+  struct Beds {
+    std::mutex mutex;
+    std::condition_variable start, finish;
+  };
+  std::unique_ptr<Beds> beds_ = std::make_unique<Beds>();
+  RoundGate gate_;
   std::atomic<bool> stop_{false};
   std::vector<Share> shares_;
   Work work_ = {};

@@ -1,5 +1,8 @@
 // Threads that share items: each is done once, whatever the numbers of both, round after round.
 #include <chrono>
+#include <memory>
+#include <set>
+#include <vector>
 #ifdef __linux__
 #include <sched.h>
 #include <sys/wait.h>
@@ -22,7 +25,7 @@ struct Tally {
   std::vector<std::atomic<int>> done;
   std::atomic<int> lowest{1 << 30}, highest{-1};
 
-  static void call(void* self, int thread, long item) {
+  static void call(void* self, int thread, long item) noexcept {
     auto& t = *static_cast<Tally*>(self);
     ++t.done[item];
     for (int seen = t.lowest; thread < seen && !t.lowest.compare_exchange_weak(seen, thread);) {
@@ -57,7 +60,7 @@ TEST(EachItemIsDoneOnceByAThreadOfThePool) {
 TEST(EachOfTwoThreadsBeginsWithItsOwnShareInEveryRound) {
   struct First {
     std::atomic<long> of[2];
-    static void call(void* self, int thread, long item) {
+    static void call(void* self, int thread, long item) noexcept {
       long none = -1;
       static_cast<First*>(self)->of[thread].compare_exchange_strong(none, item);
       const auto end = std::chrono::steady_clock::now() + std::chrono::microseconds(20);
@@ -116,7 +119,7 @@ TEST(ThreadsThatFellAsleepWakeUp) {
 TEST(TwoItemsAreDoneAtTheSameTimeByTwoThreads) {
   struct Meeting {
     std::atomic<int> here{0}, met{0};
-    static void call(void* self, int, long) {
+    static void call(void* self, int, long) noexcept {
       auto& m = *static_cast<Meeting*>(self);
       ++m.here;
       const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
@@ -129,10 +132,33 @@ TEST(TwoItemsAreDoneAtTheSameTimeByTwoThreads) {
   CHECK(meeting.met == 2);
 }
 
+TEST(ItemsOfAThreadThatIsHeldUpAreTakenByOthers) {
+  struct HeldUp {
+    std::atomic<int> others{0};
+    std::atomic<bool> all_came{false};
+    static void call(void* self, int, long item) noexcept {
+      auto& h = *static_cast<HeldUp*>(self);
+      if (item > 0) {
+        ++h.others;
+        return;
+      }
+      const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+      while (h.others < 11 && std::chrono::steady_clock::now() < end) std::this_thread::yield();
+      h.all_came = h.others == 11;
+    }
+  };
+  for (const int threads : {2, 3, 4}) {
+    HeldUp held_up;
+    ThreadPool pool(threads, false);
+    pool.run(12, {HeldUp::call, &held_up});
+    CHECK(held_up.all_came);
+  }
+}
+
 TEST(RunReturnsAfterTheSlowestItem) {
   struct Slow {
     std::atomic<int> done{0};
-    static void call(void* self, int, long item) {
+    static void call(void* self, int, long item) noexcept {
       if (item == 0) std::this_thread::sleep_for(std::chrono::milliseconds(20));
       ++static_cast<Slow*>(self)->done;
     }
@@ -151,58 +177,105 @@ TEST(PoolsComeAndGoWithOrWithoutWork) {
   }
 }
 
-TEST(PinningLeavesTheCallingThreadFree) {
-  CHECK(!usable_cores().empty());
 #ifdef __linux__
-  cpu_set_t before, after;
-  sched_getaffinity(0, sizeof before, &before);
-  {
-    ThreadPool pool(2, true);
-    Tally tally(10);
-    pool.run(10, tally.work());
-    CHECK(tally.each(1));
+namespace {
+
+/// The cores that each thread may run on, as it sees them itself.
+struct Cores {
+  explicit Cores(int threads) : of(threads), seen(threads) {}
+  std::vector<cpu_set_t> of;
+  std::vector<std::atomic<bool>> seen;
+  static void call(void* self, int thread, long) noexcept {
+    auto& c = *static_cast<Cores*>(self);
+    sched_getaffinity(0, sizeof c.of[thread], &c.of[thread]);
+    c.seen[thread] = true;
+    const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(1);
+    while (std::chrono::steady_clock::now() < end) std::this_thread::yield();
   }
-  sched_getaffinity(0, sizeof after, &after);
-  CHECK(CPU_EQUAL(&before, &after));
-#endif
+  bool all_seen() const {
+    for (const auto& yes : seen)
+      if (!yes) return false;
+    return true;
+  }
+};
+
+}  // namespace
+
+TEST(EachPinnedThreadHasOneCoreAndTheCallingOneIsLeftFree) {
+  const std::vector<int> usable = usable_cores();
+  cpu_set_t before;
+  sched_getaffinity(0, sizeof before, &before);
+  CHECK(static_cast<int>(usable.size()) == CPU_COUNT(&before));
+  const int threads = static_cast<int>(usable.size()) + 1;  // one more: the cores begin again
+  ThreadPool pool(threads, true);
+  Cores cores(threads);
+  for (int k = 0; k < 2000 && !cores.all_seen(); ++k) pool.run(2 * threads, {Cores::call, &cores});
+  CHECK(cores.all_seen());
+  CHECK(CPU_EQUAL(&before, &cores.of[0]));
+  std::set<int> taken;
+  for (int k = 1; k < threads; ++k) {
+    const int core = usable[k % usable.size()];
+    CHECK(CPU_COUNT(&cores.of[k]) == 1 && CPU_ISSET(core, &cores.of[k]));
+    taken.insert(core);
+  }
+  CHECK(taken.size() == usable.size());
 }
 
-#ifdef __linux__
-TEST(AForkedProcessDoesTheItemsWithItsOnlyThread) {
-  ThreadPool pool(3, false);
+TEST(AForkedProcessDoesTheItemsWithItsOnlyThreadAndCanDestroyThePool) {
+  auto pool = std::make_unique<ThreadPool>(3, false);
   Tally tally(20);
-  pool.run(20, tally.work());
+  pool->run(20, tally.work());
+  std::this_thread::sleep_for(std::chrono::milliseconds(2));  // the threads sleep now
   const pid_t child = fork();
   if (child == 0) {
-    pool.run(20, tally.work());
+    alarm(20);
+    pool->run(20, tally.work());
+    pool.reset();
     _exit(tally.each(2) ? 0 : 1);
   }
   int status = -1;
   waitpid(child, &status, 0);
   CHECK(WIFEXITED(status) && WEXITSTATUS(status) == 0);
-  pool.run(20, tally.work());
+  pool->run(20, tally.work());
   CHECK(tally.each(2));
 }
 #endif
 
-#ifdef __x86_64__
+namespace {
+
+// The register that says how this thread rounds and whether it flushes small numbers to zero.
+#if defined(__x86_64__)
+constexpr unsigned long kOther = 0xffc0, kSettings = ~0x3ful;  // below: what has happened so far
+unsigned long control() { return __builtin_ia32_stmxcsr(); }
+void set_control(unsigned long value) { __builtin_ia32_ldmxcsr(static_cast<unsigned>(value)); }
+#elif defined(__aarch64__)
+constexpr unsigned long kOther = 1ul << 24 | 3ul << 22, kSettings = ~0ul;
+unsigned long control() {
+  unsigned long value;
+  asm volatile("mrs %0, fpcr" : "=r"(value));
+  return value;
+}
+void set_control(unsigned long value) { asm volatile("msr fpcr, %0" : : "r"(value)); }
+#endif
+
+}  // namespace
+
 TEST(EveryThreadRoundsToNearestAndKeepsSmallNumbersWhateverTheCallerDoes) {
   struct Small {
     std::atomic<int> kept{0};
-    static void call(void* self, int, long) {
+    static void call(void* self, int, long) noexcept {
       volatile double tiny = 1e-308, ten = 10;
       const bool nearest = 1 / ten == 0.1;  // above a tenth
       static_cast<Small*>(self)->kept += tiny / 4 > 0 && nearest;
     }
   } small;
-  const unsigned before = __builtin_ia32_stmxcsr();
-  __builtin_ia32_ldmxcsr(0xffc0);  // flush to zero, round towards zero; new threads inherit it
+  const unsigned long before = control();
+  set_control(kOther);  // flush to zero, round towards zero; new threads inherit it
   ThreadPool pool(3, false), one(1, false);
   pool.run(50, {Small::call, &small});
   one.run(50, {Small::call, &small});
-  const bool left_as_it_was = __builtin_ia32_stmxcsr() >> 6 == 0xffc0u >> 6;
-  __builtin_ia32_ldmxcsr(before);
+  const bool left_as_it_was = (control() & kSettings) == (kOther & kSettings);
+  set_control(before);
   CHECK(small.kept == 100);
   CHECK(left_as_it_was);
 }
-#endif
