@@ -21,7 +21,7 @@ void compute_mass_matrix(const Tree<S>& t, RigidInertia<Wide<S>>* composites, S*
   for (int ib = t.num_bundles - 1; ib >= 0; --ib)
     for (int slot = t.bundles[ib].first_slot + t.bundles[ib].length - 1;
          slot >= t.bundles[ib].first_slot; --slot)
-      for (int lane = t.bundles[ib].lanes - 1; lane >= 0; --lane) {
+      for (int lane = used_lanes<S>(t.bundles[ib]) - 1; lane >= 0; --lane) {
         const LinkIndex link{slot, lane};
         const int j = offset + t.slots[slot].joint[lane];
         const RigidInertia<S> inertia = composite_of(link);

@@ -61,6 +61,15 @@ struct Tree {
 
 // ---- lanes of a bundle in and out of memory
 
+/// Lanes of a bundle that are in use. One, where environments are the lanes: the compiler knows.
+template <class S>
+STICKSLIP_INLINE int used_lanes(const Bundle& b) {
+  if constexpr (BundleScalar<S>::kLanes == 1)
+    return 1;
+  else
+    return b.lanes;
+}
+
 /// values[index[lane]] of each lane.
 template <class S>
 STICKSLIP_INLINE Wide<S> load_lanes(const S* values, const int index[kMaxLanes]) {
@@ -140,10 +149,10 @@ STICKSLIP_INLINE void add_to_parents(Tree<S>& t, const Bundle& b, const X<Wide<S
   if (b.on_base) {
     S* to = reinterpret_cast<S*>(&base);
     Numbers<W, X>::visit(given, [&](int k, const W& x) STICKSLIP_LAMBDA {
-      for (int lane = b.lanes - 1; lane >= 0; --lane) to[k] = to[k] + lane_of<S>(x, lane);
+      for (int lane = used_lanes<S>(b) - 1; lane >= 0; --lane) to[k] = to[k] + lane_of<S>(x, lane);
     });
   } else {
-    for (int lane = b.lanes - 1; lane >= 0; --lane) {
+    for (int lane = used_lanes<S>(b) - 1; lane >= 0; --lane) {
       auto* to = reinterpret_cast<W*>(&(t.links[b.parent[lane].slot].*field));
       Numbers<W, X>::visit(given, [&](int k, const W& x) STICKSLIP_LAMBDA {
         if constexpr (BundleScalar<S>::kLanes == 1)
