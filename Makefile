@@ -79,7 +79,7 @@ bench: $(VENV)/bench
 bench-contact: $(VENV)/bench
 	$(BIN)/python benchmarks/contact/run.py $(BENCH)
 
-# Whole tasks of worlds, which take long with sanitizers and in emulators; those of batches, which are left, run the same code.
+# Whole tasks of worlds, which take long with sanitizers and in emulators; those of batches stay in.
 LONG_TESTS := physics_test_(tasks|large_steps)
 
 # -O1: with checks in every unrolled kernel, -O2 takes minutes and gigabytes per file.
@@ -89,7 +89,6 @@ sanitize: $(VENV)/tools
 	$(BIN)/cmake --build build/sanitize
 	$(BIN)/ctest --test-dir build/sanitize --output-on-failure -j $(CMAKE_BUILD_PARALLEL_LEVEL) -E '$(LONG_TESTS)'
 
-# Shows that NEON compiles and has the bits of every other instruction set, on a machine without it. The libraries are ARM's wheels.
 .PHONY: arm-tools
 arm-tools:
 	@command -v aarch64-linux-gnu-g++ >/dev/null && command -v qemu-aarch64 >/dev/null || \
@@ -103,6 +102,7 @@ $(ARM_WHEELS)/installed: $(VENV)/tools | arm-tools
 	  --platform manylinux_2_28_aarch64 --platform manylinux_2_17_aarch64 -r $(ARM_WHEELS)/wanted.txt
 	touch $@
 
+# Shows that NEON compiles and has the bits of every other instruction set, on a machine without it. The libraries are ARM's wheels.
 test-arm: arm-tools $(ARM_WHEELS)/installed
 	$(BIN)/cmake -S . -B build/aarch64 -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja -DPython_EXECUTABLE=$(abspath $(BIN))/python \
 	  -DCMAKE_TOOLCHAIN_FILE=cmake/aarch64.cmake -DSTICKSLIP_CMEEL_PREFIX=$(abspath $(ARM_WHEELS))/cmeel.prefix \

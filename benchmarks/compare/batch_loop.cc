@@ -215,6 +215,7 @@ void BatchEngine<T>::observe(int e, long age, Snapshot& out) {
 
 template <class T>
 std::uint64_t BatchEngine<T>::hash(std::uint64_t seed) const {
+  // Not of residual and status, which are those of a call: calls differ from engine to engine.
   const std::vector<double> u(u_, u_ + static_cast<size_t>(num_envs_) * nu_);
   return hash_of(u, seed);
 }

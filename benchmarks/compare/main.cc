@@ -24,12 +24,13 @@ constexpr const char* kUsage =
     "                      [_threads<N>|_apart<N>]\n"
     "                      (default: what benchmarks/README.md lists)\n"
     "  --robots-per-batch N   a multiple of 16 (default 64)\n"
-    "  --steps N           per repetition (default 2000); a batch takes 16 N robot-steps\n"
+    "  --steps N           per repetition (default 2000); a batch takes 16 N robot-steps, where\n"
+    "                      threads are compared 3 times about 40 N\n"
     "  --repetitions N     counted ones; one more warms up (default 40)\n"
     "  --robots FOLDER     example-robot-data's robots folder: adds other robots than ANYmal\n"
     "  --urdf FILE         ANYmal's description\n"
     "  --core N            pin to this core (default: the second of those there are; -1: none)\n"
-    "  --no-statistics     times only; nothing is checked\n"
+    "  --no-statistics     times, and who must end in the same bits; nothing is watched\n"
     "  --check             fail (exit status 1) where an aim is missed, too\n"
     "  --json FILE         write the results there too\n";
 

@@ -35,12 +35,14 @@ struct Contestant {
 };
 
 struct Seconds {
-  double cpu = 0, wall = 0;  // of engines with one thread
+  double cpu = 0, wall = 0;  // of engines timed by the CPU
 };
 
 /// One repetition.
 void time(Contestant& c, bool counted, Seconds& total) {
   c.runner->prepare();
+  // What another engine leaves awake or half done is not this one's to pay for.
+  if (c.choice.wall_clock()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   const int parts = c.runner->parts();
   double speed = 0;  // robot-steps per second
   for (int part = 0; part < parts; ++part) {
@@ -77,7 +79,7 @@ std::uint64_t watch(Contestant& c, Observer& observer) {
   return hash;
 }
 
-std::vector<std::string> faults_of(const Measurement& m, const Scenario& s, bool repeats) {
+std::vector<std::string> faults_of(const Measurement& m, const Scenario& s) {
   std::vector<std::string> faults;
   const auto fault = [&](bool wrong, const std::string& what) {
     if (wrong) faults.push_back(what);
@@ -87,7 +89,7 @@ std::vector<std::string> faults_of(const Measurement& m, const Scenario& s, bool
   const std::string who = ours ? "stickslip" : "MuJoCo";
   char tolerance[16];
   std::snprintf(tolerance, sizeof tolerance, "%.0e", f.residuals.tolerance());
-  fault(!repeats, "the observed runs did not repeat the timed ones");
+  fault(!m.watched, "the observed runs did not repeat the timed ones");
   fault(f.exploded > 0, std::to_string(f.exploded) + " steps exploded");
   fault(f.failed > 0, who + " warned of bad states");
   fault(ours && f.residuals.share_above() > kBadResidual,
@@ -100,14 +102,14 @@ std::vector<std::string> faults_of(const Measurement& m, const Scenario& s, bool
   return faults;
 }
 
-/// The first batch among `engines` that differs from m in instruction set or threads only; null:
-/// none. They must end in the same bits.
+/// The first batch among `engines` that takes the same steps of the same robots: it differs in what
+/// shows in no bit. Null: none.
 const Measurement* twin_of(const Measurement& m, const std::vector<Measurement>& engines) {
   for (const Measurement& other : engines)
     if (m.engine.kind == EngineKind::kBatch && other.engine.kind == EngineKind::kBatch &&
         m.engine.precision == other.engine.precision &&
         m.engine.integrator == other.engine.integrator && m.robots == other.robots &&
-        m.microseconds.size() == other.microseconds.size())
+        m.robot_steps == other.robot_steps && m.microseconds.size() == other.microseconds.size())
       return &other;
   return nullptr;
 }
@@ -115,25 +117,24 @@ const Measurement* twin_of(const Measurement& m, const std::vector<Measurement>&
 /// What c was timed at, and by `earlier` engines or a second look what it did.
 Measurement measurement_of(Contestant& c, const std::vector<Measurement>& earlier,
                            const Scenario& scenario, bool statistics) {
-  Measurement m{c.choice,
-                c.runner->robots(),
-                c.runner->robot_steps(),
-                c.runner->instruction_set(),
-                c.microseconds,
-                c.hash,
-                {},
-                {}};
+  Measurement m;
+  m.engine = c.choice;
+  m.robots = c.runner->robots();
+  m.robot_steps = c.runner->robot_steps();
+  m.instruction_set = c.runner->instruction_set();
+  m.microseconds = c.microseconds;
+  m.hash = c.hash;
   const Measurement* twin = twin_of(m, earlier);
   const bool same_bits = twin && twin->hash == m.hash;
-  if (statistics && same_bits) {
+  if (statistics && same_bits && twin->watched) {
     m.findings = twin->findings;
-    m.faults = faults_of(m, scenario, true);
+    m.watched = true;
   } else if (statistics) {
     Observer observer(scenario, c.choice.tolerance());
-    const bool repeats = watch(c, observer) == c.hash;
+    m.watched = watch(c, observer) == c.hash;
     m.findings = observer.finish();
-    m.faults = faults_of(m, scenario, repeats);
   }
+  if (statistics) m.faults = faults_of(m, scenario);
   if (twin && !same_bits) m.faults.push_back("it ends in other bits than " + twin->engine.name);
   return m;
 }
@@ -179,17 +180,26 @@ ScenarioResult measure(const Scenario& scenario, const Settings& settings) {
     try {
       contestants.push_back({choice, make_runner(choice, scenario, settings), 0, {}});
     } catch (const ModelError& error) {  // such as an instruction set that is not there
-      result.engines.push_back({choice, 0, 0, "", {}, 0, {}, {error.what()}});
+      result.engines.emplace_back();
+      result.engines.back().engine = choice;
+      result.engines.back().faults = {error.what()};
     }
   }
 
+  // Who comes after whom must not decide: those on the wall clock take turns in being the first.
+  std::vector<Contestant*> on_the_wall;
+  for (Contestant& c : contestants)
+    if (c.choice.wall_clock()) on_the_wall.push_back(&c);
   Seconds total;
+  size_t turn = 0;
   for (int rep = 0; rep <= settings.repetitions; ++rep) {  // 0 warms up
     if (rep == 1)
       for (Contestant& c : contestants) c.runner->mark();
-    for (int round = 0; round < Settings::kThreadRounds; ++round)
-      for (Contestant& c : contestants)
-        if (round == 0 || c.choice.wall_clock()) time(c, rep > 0, total);
+    for (Contestant& c : contestants)
+      if (!c.choice.wall_clock()) time(c, rep > 0, total);
+    for (int round = 0; round < Settings::kThreadRounds; ++round, ++turn)
+      for (size_t k = 0; k < on_the_wall.size(); ++k)
+        time(*on_the_wall[(turn + k) % on_the_wall.size()], rep > 0, total);
   }
   if (total.wall > 0) result.core_share = total.cpu / total.wall;
 

@@ -12,8 +12,9 @@ struct Measurement {
   long robot_steps = 0;              ///< of a repetition
   std::string instruction_set;       ///< of a batch
   std::vector<double> microseconds;  ///< per robot-step, one per repetition
-  std::uint64_t hash = 0;            ///< over the final states of the repetitions
+  std::uint64_t hash = 0;            ///< over the velocities that the repetitions ended with
   Findings findings;
+  bool watched = false;             ///< findings are those of these repetitions
   std::vector<std::string> faults;  ///< why the result does not count; empty: it does
 
   /// Mean over the repetitions: an episode has costly and cheap phases. Of wall time, which knows
@@ -24,7 +25,7 @@ struct Measurement {
 struct ScenarioResult {
   const Scenario* scenario;
   double disagreement = 0;  ///< of the models, see model_disagreement
-  double core_share = NAN;  ///< share of the wall clock that a single thread had its core
+  double core_share = NAN;  ///< share of the wall clock that engines timed by it had a core
   std::vector<Measurement> engines;
 
   const Measurement* find(const std::string& engine) const;

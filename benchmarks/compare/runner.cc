@@ -63,9 +63,7 @@ class BatchRunner : public Runner {
     require(threads_ <= num_cores(), choice.name + " needs a core for each thread; there are " +
                                          std::to_string(num_cores()));
     require(threads_ <= 1 || threads_ == compared_cores_,
-            choice.name +
-                ": another number of threads is in the same run; one is compared with "
-                "one thread on its cores");
+            choice.name + ": run one number of threads at a time");
     const int batches = choice.apart ? threads_ : 1, share = robots_ / batches;
     require(share % Settings::kFullPack == 0 && share * batches == robots_,
             choice.name + ": " + std::to_string(robots_ / Settings::kFullPack) +

@@ -30,7 +30,7 @@ void collect_joint_forces(Tree<S>& t, S* out) {
     for (int slot = last; slot >= b.first_slot; --slot) {
       f = f + t.links[slot].force;
       if (slot == last && b.has_children) f = f + t.links[slot].force_from_children;
-      store_lanes<S>(dot(f, t.links[slot].axis), out, t.slots[slot].joint, used_lanes<S>(b));
+      store_lanes<S>(dot(f, t.links[slot].axis), out, t.slots[slot].joint, b);
     }
     add_to_parents<S, Spatial>(t, b, f, t.base.force, &LinkState<W>::force_from_children);
   }

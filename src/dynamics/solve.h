@@ -41,13 +41,13 @@ S solve_lower(Tree<S>& t, S base[6], S* joints) {
     W chain = constant<W>(0);
     blocks_outward(b, [&](int slot, auto n) STICKSLIP_LAMBDA {
       solve_block<decltype(n)::value>(t.links + slot, a, [&](int k, W rate) STICKSLIP_LAMBDA {
-        store_lanes<S>(rate, joints, t.slots[slot + k].joint, used_lanes<S>(b));
+        store_lanes<S>(rate, joints, t.slots[slot + k].joint, b);
         chain = madd(t.links[slot + k].x, t.links[slot + k].x, chain);
       });
     });
     const int last = b.first_slot + b.length - 1;
     if (b.has_children) t.links[last].acceleration = a;
-    sum = add_lanes<S>(chain, used_lanes<S>(b), sum);
+    sum = add_lanes<S>(chain, b, sum);
   }
   return sum;
 }
@@ -80,7 +80,7 @@ S squared_norm(const Tree<S>& t) {
     W chain = constant<W>(0);
     for (int slot = b.first_slot; slot < b.first_slot + b.length; ++slot)
       chain = madd(t.links[slot].x, t.links[slot].x, chain);
-    sum = add_lanes<S>(chain, used_lanes<S>(b), sum);
+    sum = add_lanes<S>(chain, b, sum);
   }
   return sum;
 }
@@ -101,7 +101,7 @@ Spatial<S> base_momentum(const Tree<S>& t) {
     Spatial<W> chain = zero_spatial<W>();
     for (int slot = b.first_slot; slot < b.first_slot + b.length; ++slot)
       chain = madd(t.links[slot].arm, t.links[slot].x, chain);
-    add_lanes<S, Spatial>(chain, used_lanes<S>(b), sum);
+    add_lanes<S, Spatial>(chain, b, sum);
   }
   return sum;
 }

@@ -82,11 +82,11 @@ STICKSLIP_INLINE Wide<S> load_lanes(const S* values, const int index[kMaxLanes])
 
 template <class S>
 STICKSLIP_INLINE void store_lanes(const Wide<S>& w, S* values, const int index[kMaxLanes],
-                                  int lanes) {
+                                  const Bundle& b) {
   if constexpr (BundleScalar<S>::kLanes == 1) {
     values[index[0]] = w;
   } else {
-    for (int lane = 0; lane < lanes; ++lane) values[index[lane]] = get_lane(w, lane);
+    for (int lane = 0; lane < b.lanes; ++lane) values[index[lane]] = get_lane(w, lane);
   }
 }
 
@@ -167,15 +167,15 @@ STICKSLIP_INLINE void add_to_parents(Tree<S>& t, const Bundle& b, const X<Wide<S
 
 /// Adds the lanes of a bundle to `sum`, one by one.
 template <class S>
-STICKSLIP_INLINE S add_lanes(const Wide<S>& part, int lanes, S sum) {
-  for (int lane = 0; lane < lanes; ++lane) sum = sum + lane_of<S>(part, lane);
+STICKSLIP_INLINE S add_lanes(const Wide<S>& part, const Bundle& b, S sum) {
+  for (int lane = 0; lane < used_lanes<S>(b); ++lane) sum = sum + lane_of<S>(part, lane);
   return sum;
 }
 template <class S, template <class> class X>
-STICKSLIP_INLINE void add_lanes(const X<Wide<S>>& part, int lanes, X<S>& total) {
+STICKSLIP_INLINE void add_lanes(const X<Wide<S>>& part, const Bundle& b, X<S>& total) {
   S* to = reinterpret_cast<S*>(&total);
-  Numbers<Wide<S>, X>::visit(part, [&](int k, const Wide<S>& x)
-                                       STICKSLIP_LAMBDA { to[k] = add_lanes<S>(x, lanes, to[k]); });
+  Numbers<Wide<S>, X>::visit(
+      part, [&](int k, const Wide<S>& x) STICKSLIP_LAMBDA { to[k] = add_lanes<S>(x, b, to[k]); });
 }
 
 template <class W, class S>

@@ -93,7 +93,7 @@ void add_composite(Tree<S>& t, const Bundle& b) {
   RigidInertia<Wide<S>> sum = at_reference(t.links[b.first_slot].inertia);
   for (int slot = b.first_slot + 1; slot < b.first_slot + b.length; ++slot)
     sum = sum + at_reference(t.links[slot].inertia);
-  add_lanes<S, RigidInertia>(sum, used_lanes<S>(b), t.base.composite);
+  add_lanes<S, RigidInertia>(sum, b, t.base.composite);
 }
 
 template <class S>

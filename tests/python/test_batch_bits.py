@@ -101,11 +101,15 @@ def test_number_of_environments_and_threads_and_their_pinning_change_no_bit(dtyp
     run(everything, 200)
     assert everything.contact_active.any()
     for num_envs in (1, 5, 16, 17, 33):
-        for num_threads, pin_threads in ((1, False), (2, True), (3, False)):
+        for num_threads, pin_threads in ((1, False), (2, False), (2, True), (3, True)):
             batch = scattered(num_envs, dtype, num_threads, pin_threads, integrator=integrator)
             run(batch, 200)
             assert_same_bits(
-                batch, everything, ("q", "u", *OUTPUTS), slice(num_envs), f"{num_envs}, {num_threads} threads"
+                batch,
+                everything,
+                ("q", "u", *OUTPUTS),
+                slice(num_envs),
+                f"{num_envs}, {num_threads} threads, {pin_threads=}",
             )
 
 

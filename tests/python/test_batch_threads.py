@@ -7,6 +7,7 @@ import os
 import signal
 import threading
 import time
+import weakref
 
 import pytest
 
@@ -95,12 +96,16 @@ def test_forked_process_steps_on_with_the_same_bits_and_can_let_go_of_the_batch(
     read, write = os.pipe()
     child = os.fork()
     if child == 0:  # nothing of pytest may run here
-        signal.alarm(60)
-        batch.step(5)
-        same = batch.q.tobytes() == expected
-        del batch
-        os.write(write, b"1" if same else b"0")
-        os._exit(0)
+        try:
+            signal.alarm(60)
+            batch.step(5)
+            same = batch.q.tobytes() == expected
+            gone = weakref.ref(batch)
+            del batch
+            gc.collect()
+            os.write(write, b"1" if same and gone() is None else b"0")
+        finally:
+            os._exit(0)
     os.close(write)
     os.waitpid(child, 0)
     assert os.read(read, 1) == b"1"

@@ -112,7 +112,7 @@ def test_unknown_arguments_are_named_beside_those_of_the_task() -> None:
         Falling(3, foo=1)
 
 
-def test_batch_regroups_only_where_it_is_asked_for(monkeypatch) -> None:
+def test_batch_regroups_only_where_it_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     asked = []
     make = ss.Batch.__init__
 

@@ -8,7 +8,8 @@ namespace stickslip::backend {
 
 class RoundGate {
  public:
-  /// The round under way, or the last one; 0 before the first.
+  /// The round under way, or the last one; 0 before the first. After 2^32 rounds they begin again:
+  /// a helper that slept through all of them misses one.
   std::uint64_t round() const { return word_.load(std::memory_order_relaxed) >> kRoundShift; }
 
   // Of who calls the round. What was written before `open` is seen inside, and what was written
@@ -16,7 +17,7 @@ class RoundGate {
 
   /// Begins the next round. The gate must be closed and empty.
   void open() { word_.store((round() + 1) << kRoundShift | kOpen, std::memory_order_release); }
-  void close() { word_.fetch_and(~kOpen, std::memory_order_relaxed); }
+  void close() { word_.fetch_and(~kOpen, std::memory_order_relaxed); }  // what counts is `empty`
   bool empty() const { return inside(word_.load(std::memory_order_acquire)) == 0; }
 
   // Of who helps. `seen`: the last round he was in.
@@ -37,7 +38,7 @@ class RoundGate {
   }
   /// True: he was the last to leave a closed gate.
   bool leave() {
-    const std::uint64_t now = word_.fetch_sub(1, std::memory_order_acq_rel) - 1;
+    const std::uint64_t now = word_.fetch_sub(1, std::memory_order_release) - 1;
     return !(now & kOpen) && inside(now) == 0;
   }
 

@@ -141,7 +141,9 @@ bool ThreadPool::wait_for_round(std::uint64_t seen) {
   const auto called = [&] { return stop_ || gate_.admits(seen); };
   if (!wait_awake(called)) {
     std::unique_lock lock(beds_->mutex);
-    beds_->start.wait(lock, called);
+    // Woken too late, it stays awake for the next.
+    const std::uint64_t last = gate_.round();
+    beds_->start.wait(lock, [&] { return called() || gate_.round() != last; });
   }
   return !stop_;
 }

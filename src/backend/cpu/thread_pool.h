@@ -17,8 +17,8 @@ std::vector<int> usable_cores();
 class ThreadPool {
  public:
   /// `threads` >= 1 work, the calling one among them. `pin`: thread k >= 1 is bound to core k,
-  /// counted from 0, of usable_cores() now, and to core k - n where there are n <= k; it stays free
-  /// where that core is taken from the process meanwhile.
+  /// counted from 0, of usable_cores() now (k modulo their number); it stays free where that core
+  /// is taken from the process meanwhile.
   ThreadPool(int threads, bool pin);
   ~ThreadPool();
   ThreadPool(const ThreadPool&) = delete;
@@ -31,7 +31,8 @@ class ThreadPool {
     void* self;
   };
   /// Calls work.call(work.self, thread, item) for each item 0 .. items - 1, each once, and returns
-  /// when all are done. One round at a time, and none from within a call.
+  /// when all are done. One round at a time, and none from within a call. In a forked process the
+  /// calling thread does them all.
   void run(long items, Work work);
 
  private:

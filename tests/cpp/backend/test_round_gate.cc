@@ -1,4 +1,8 @@
 // The gate of a round of work: who is let in, and who is waited for.
+#include <cstdint>
+#include <thread>
+#include <vector>
+
 #include "backend/cpu/round_gate.h"
 #include "check.h"
 
@@ -44,4 +48,39 @@ TEST(AClosedGateIsEmptyOnlyWhenTheLastHasLeft) {
   CHECK(gate.leave() && gate.empty());
   gate.open();
   CHECK(gate.enter(third) && !gate.empty());
+}
+
+TEST(WhatIsWrittenBeforeARoundIsSeenInsideAndWhatIsWrittenInsideAfterIt) {
+  constexpr int kHelpers = 3, kRounds = 20000;
+  RoundGate gate;
+  std::atomic<bool> stop{false};
+  std::uint64_t task = 0;  // plain numbers: only the gate orders their uses
+  std::uint64_t seen_by[kHelpers] = {};
+  bool right = true;
+  std::vector<std::thread> helpers;
+  for (int k = 0; k < kHelpers; ++k)
+    helpers.emplace_back([&, k] {
+      for (std::uint64_t seen = 0; !stop; std::this_thread::yield())
+        if (gate.enter(seen)) {
+          seen_by[k] = task;
+          gate.leave();
+        }
+    });
+  long helped = 0;
+  for (std::uint64_t round = 1; round <= kRounds || helped == 0; ++round) {
+    task = round;
+    gate.open();
+    if (round % 16 == 0) std::this_thread::yield();
+    gate.close();
+    while (!gate.empty()) std::this_thread::yield();
+    for (std::uint64_t& seen : seen_by) {
+      right = right && (seen == 0 || seen == round);
+      helped += seen == round;
+      seen = 0;
+    }
+  }
+  stop = true;
+  for (std::thread& helper : helpers) helper.join();
+  CHECK(right);
+  CHECK(helped > 0);
 }

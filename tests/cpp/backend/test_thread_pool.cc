@@ -5,8 +5,11 @@
 #include <vector>
 #ifdef __linux__
 #include <sched.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
+
+#include <csignal>
 #endif
 
 #include "backend/cpu/thread_pool.h"
@@ -219,6 +222,47 @@ TEST(EachPinnedThreadHasOneCoreAndTheCallingOneIsLeftFree) {
     taken.insert(core);
   }
   CHECK(taken.size() == usable.size());
+}
+
+namespace {
+
+/// A thread of a pool that is kept from working, as by a busy core, until it is released.
+struct Held {
+  static inline std::atomic<bool> held{false}, released{false};
+  std::atomic<long> thread{0};
+
+  static void call(void* self, int thread, long) noexcept {
+    if (thread > 0) static_cast<Held*>(self)->thread = syscall(SYS_gettid);
+    const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(1);
+    while (std::chrono::steady_clock::now() < end) std::this_thread::yield();
+  }
+  static void hold(int) {
+    held = true;
+    while (!released) {
+    }
+  }
+};
+
+}  // namespace
+
+TEST(AThreadThatCannotComeIsNotWaitedForAndHelpsAgainLater) {
+  ThreadPool pool(2, false);
+  Held held;
+  for (int k = 0; k < 2000 && held.thread == 0; ++k) pool.run(4, {Held::call, &held});
+  CHECK(held.thread != 0);
+  const auto before = std::signal(SIGUSR1, Held::hold);
+  syscall(SYS_tgkill, getpid(), held.thread.load(), SIGUSR1);
+  while (!Held::held) std::this_thread::yield();
+  alarm(60);  // a pool that waits for it never comes back
+  Tally tally(12);
+  pool.run(12, tally.work());
+  alarm(0);
+  CHECK(tally.each(1) && tally.highest == 0);
+  Held::released = true;
+  held.thread = 0;
+  for (int k = 0; k < 2000 && held.thread == 0; ++k) pool.run(4, {Held::call, &held});
+  CHECK(held.thread != 0);
+  std::signal(SIGUSR1, before);
 }
 
 TEST(AForkedProcessDoesTheItemsWithItsOnlyThreadAndCanDestroyThePool) {
