@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <mutex>
 
 #include "benchmarks/compare/observer.h"
 #include "scenes/normal.h"
@@ -163,6 +164,7 @@ Scenario make(const Row& row, const std::string& folder) {
   for (const auto& [joint, angle] : row.posture) posture[s.model->joint_index(joint)] = angle;
 
   auto ruler = std::make_shared<World>();
+  auto measuring = std::make_shared<std::mutex>();  // batches apart can ask at the same time
   Robot& robot = ruler->add_robot(s.model);
   std::vector<double> q(robot.q().begin(), robot.q().end()), u(s.model->nu(), 0.0);
   std::copy(posture.begin(), posture.end(), q.end() - posture.size());
@@ -177,6 +179,7 @@ Scenario make(const Row& row, const std::string& folder) {
       q[first + j] = posture[j] + 0.02 * scenes::normal(kEpisodeBase * episode + j);
     if (first == 0) return;
     q[3] = 1;
+    const std::lock_guard lock(*measuring);
     q[2] = 0.02 - lowest(ruler->robot(0), q, u);  // 2 cm above the ground
   };
   s.target = [=, spread = row.spread](int episode, int k, std::span<double> target) {
