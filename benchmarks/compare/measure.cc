@@ -41,8 +41,6 @@ struct Seconds {
 /// One repetition.
 void time(Contestant& c, bool counted, Seconds& total) {
   c.runner->prepare();
-  // What another engine leaves awake or half done is not this one's to pay for.
-  if (c.choice.wall_clock()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   const int parts = c.runner->parts();
   double speed = 0;  // robot-steps per second
   for (int part = 0; part < parts; ++part) {

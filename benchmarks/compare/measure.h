@@ -9,7 +9,7 @@ namespace stickslip::benchmarks {
 struct Measurement {
   EngineChoice engine;
   int robots = 1;
-  long robot_steps = 0;              ///< of a repetition
+  long robot_steps = 0;              ///< timed in a repetition
   std::string instruction_set;       ///< of a batch
   std::vector<double> microseconds;  ///< per robot-step, one per repetition
   std::uint64_t hash = 0;            ///< over the velocities that the repetitions ended with

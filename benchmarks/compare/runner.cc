@@ -112,7 +112,7 @@ class BatchRunner : public Runner {
     for (const auto& engine : engines_) seed = engine->hash(seed);
     return seed;
   }
-  long robot_steps() const override { return steps() * robots_; }
+  long robot_steps() const override { return part_steps_ * compared_cores_ * robots_; }
   int robots() const override { return robots_; }
   std::string instruction_set() const override {
     return engines_.front()->batch().instruction_set();
@@ -124,11 +124,17 @@ class BatchRunner : public Runner {
   }
   double timed(BatchEngine<T>& engine) const {
     NoObserver nobody;
+    const long shares = compared_cores_ / parts();
+    engine.run(warm_up() * shares, nobody);
     const double start = wall_seconds();
-    engine.run(part_steps_ * (compared_cores_ / parts()), nobody);
+    engine.run(part_steps_ * shares, nobody);
     return wall_seconds() - start;
   }
-  long steps() const { return part_steps_ * compared_cores_; }  // of a repetition
+  /// Steps before those of a part: caches are cold, threads asleep, and one thread begins as often
+  /// as it has cores.
+  long warm_up() const { return threads_ > 0 ? kTick : 0; }
+  /// Of a repetition.
+  long steps() const { return (warm_up() + part_steps_) * compared_cores_; }
   int work() const { return threads_ > 0 ? Settings::kThreadWork : Settings::kBatchWork; }
   static int most_threads(const Settings& settings) {
     int most = 1;
@@ -139,7 +145,7 @@ class BatchRunner : public Runner {
   int threads_;         // 0: one, on the core of everybody else
   int compared_cores_;  // cores of the engine with the most threads
   int robots_;          // of all batches
-  long part_steps_;
+  long part_steps_;     // timed; a part is what one core takes of a repetition
   std::vector<std::unique_ptr<BatchEngine<T>>> engines_;  // one; apart: as many as threads
 };
 

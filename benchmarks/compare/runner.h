@@ -40,7 +40,7 @@ class Runner {
   virtual void watch(Observer& observer) = 0;  ///< one repetition, observed
 
   virtual std::uint64_t hash(std::uint64_t seed) const = 0;  ///< of all velocities
-  virtual long robot_steps() const = 0;                      ///< of a repetition
+  virtual long robot_steps() const = 0;                      ///< timed in a repetition
   virtual int robots() const { return 1; }
   virtual std::string instruction_set() const { return ""; }  ///< of a batch
 };
