@@ -33,13 +33,13 @@ def interval(name: str, value: Any) -> tuple[float, float]:
 LARGEST_COUNT = 2**31 - 1  # the core counts in 32 bits
 
 
-def count(name: str, value: Any) -> int:
-    """An integer, zero or positive, that the core can hold."""
+def count(name: str, value: Any, least: int = 0) -> int:
+    """An integer from `least` up that the core can hold."""
     if isinstance(value, (bool, np.bool_)) or not hasattr(value, "__index__"):
         raise TypeError(f"{name} is {value!r}; an integer is wanted")
     result = value.__index__()
-    if result < 0:
-        raise ValueError(f"{name} is {value}; it must be zero or positive")
+    if result < least:
+        raise ValueError(f"{name} is {value}; it must be {f'at least {least}' if least else 'zero or positive'}")
     if result > LARGEST_COUNT:
         raise ValueError(f"{name} is {value}; it must be at most {LARGEST_COUNT}")
     return result

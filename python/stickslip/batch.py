@@ -75,14 +75,12 @@ class Batch(Profiled):
     ):
         if not isinstance(world, World):
             raise TypeError(f"world is a {type(world).__name__}; a stickslip.World is wanted")
-        if count("num_envs", num_envs) == 0:
-            raise ValueError("num_envs is 0; it must be at least 1")
         if instruction_set is not None and not isinstance(instruction_set, str):
             raise TypeError(f"instruction_set is {instruction_set!r}; a name such as 'avx2', or None, is wanted")
         self._dtype = _precision(dtype)
         self._core = _core.Batch(
             world._core,
-            num_envs=count("num_envs", num_envs),
+            num_envs=count("num_envs", num_envs, least=1),
             precision=self._dtype.name,
             num_threads=count("num_threads", num_threads),
             pin_threads=bool(pin_threads),

@@ -290,7 +290,7 @@ def solve(
         "tolerance": number("tolerance", tolerance),
         "relative_tolerance": number("relative_tolerance", relative_tolerance),
         "max_sweeps": count("max_sweeps", max_sweeps),
-        "max_iterations": 0 if max_iterations is None else _at_least_one("max_iterations", max_iterations),
+        "max_iterations": 0 if max_iterations is None else count("max_iterations", max_iterations, least=1),
         "minimum_norm": bool(minimum_norm),
         "proximal_weight": number("proximal_weight", proximal_weight),
         "shift": str(shift),
@@ -367,13 +367,6 @@ def _time_single_contact(
     names = [methods] if isinstance(methods, str) else list(methods)
     times = _core._time_single_contact(G.reshape(-1), c.reshape(-1), mu, names, str(law), float(tolerance), int(rounds))
     return dict(zip(names, times, strict=True))
-
-
-def _at_least_one(name: str, value: int) -> int:
-    result = count(name, value)
-    if result == 0:
-        raise ValueError(f"{name} is 0; it must be at least 1, or None for the method's own limit")
-    return result
 
 
 def _blocks(matrix: sparse.sparray, n: int) -> sparse.bsr_array:

@@ -34,9 +34,7 @@ class Recorder:
 
     def __init__(self, world: World, path: str | os.PathLike[str], every: int = 1):
         self._world = world
-        self._every = count("every", every)
-        if self._every == 0:
-            raise ValueError("every is 0; it must be at least 1")
+        self._every = count("every", every, least=1)
         self._pattern = _pattern(path_of(path))
         self._number = _first_free(self._pattern)
         self._seen = 0  # steps with contacts

@@ -56,7 +56,7 @@ def test_worlds_that_a_batch_cannot_hold_are_named(make, says: str) -> None:
     ("arguments", "error", "says"),
     [
         ({"num_envs": 0}, ValueError, "num_envs is 0; it must be at least 1"),
-        ({"num_envs": -3}, ValueError, "num_envs is -3"),
+        ({"num_envs": -3}, ValueError, "num_envs is -3; it must be at least 1"),
         ({"num_envs": 2**31}, ValueError, "num_envs is 2147483648; it must be at most"),
         ({"num_envs": 4.0}, TypeError, "num_envs is 4.0; an integer"),
         ({"num_envs": True}, TypeError, "num_envs is True"),

@@ -47,8 +47,7 @@ class Options:
     def __post_init__(self) -> None:
         count("threads", self.threads)
         for name in ("envs", "steps"):
-            if count(name, getattr(self, name)) == 0:
-                raise ValueError(f"{name} is 0; it must be at least 1")
+            count(name, getattr(self, name), least=1)
 
     @property
     def steps_of_round(self) -> int:

@@ -115,12 +115,12 @@ class VectorTask(VectorEnv):
     ):
         if render_mode is not None:
             raise ValueError(f"render_mode is {render_mode!r}; this task draws nothing, use None")
-        self.num_envs = _positive("num_envs", num_envs)
+        self.num_envs = count("num_envs", num_envs, least=1)
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
         self.metadata = dict(self.metadata, autoreset_mode=self.autoreset_mode)
         self._make_batch(dtype, num_threads, batch_options)
         steps = round(self.episode_seconds / self.step_seconds) if max_episode_steps is None else max_episode_steps
-        self.max_episode_steps = _positive("max_episode_steps", steps)
+        self.max_episode_steps = count("max_episode_steps", steps, least=1)
         self._allocate()
         self.setup()
         self._make_spaces()
@@ -134,7 +134,7 @@ class VectorTask(VectorEnv):
         # Robots that walk in steps of some milliseconds change their feet too soon for it (docs/design/011).
         options = {"regroup_every": 0, **options}
         self.batch = Batch(self.world, self.num_envs, dtype, num_threads, **options)
-        self.step_seconds = self.world.time_step * _positive("decimation", self.decimation)
+        self.step_seconds = self.world.time_step * count("decimation", self.decimation, least=1)
         if self.action_size is None:
             self.action_size = self.batch.model.num_joints
 
@@ -406,13 +406,6 @@ def _check_options(task_class: type[VectorTask], options: dict[str, Any]) -> Non
         raise TypeError(
             f"{task_class.__name__} has no argument {unknown}; it takes {', '.join(dict.fromkeys(known + batch))}"
         )
-
-
-def _positive(name: str, value: Any) -> int:
-    result = count(name, value)
-    if result == 0:
-        raise ValueError(f"{name} is 0; it must be at least 1")
-    return result
 
 
 def _seed(name: str, value: Any) -> int:
