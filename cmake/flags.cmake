@@ -19,7 +19,7 @@ function(stickslip_instruction_set target scope name)
     set(flags -march=x86-64-v3)
     set(bits 256)
   elseif(name STREQUAL "avx512")
-    set(flags -march=x86-64-v4)
+    set(flags -march=x86-64-v4 -mtune=icelake-server)  # generic tuning costs 1.5 % where ANYmal stands
     set(bits 512)
   endif()
   # Structs of packs are copied by whole registers: a load waits long for narrower stores to the same place.

@@ -159,7 +159,7 @@ STICKSLIP_STAGE Outcome<S> iterate(FactoredProblem<S>& p, Mask<S> live, S tolera
   const S speed = constant<S>(0.1) * sqrt(tolerance_squared);
   S before = constant<S>(1e30);
   Mask<S> only_swept = live;
-  out.foreseen = live & !live;
+  out.foreseen = none<S>();
   const int cap = kMaxDissipation ? o.max_dissipation_sweeps : o.max_sweeps;
   for (int k = 1;; ++k) {
     const S change = sweep<M, kMaxDissipation>(p, live, speed);

@@ -192,7 +192,7 @@ class FactoredProblem {
     c.friction = zero;
     for (S& x : c.private_block) x = zero;
     for (int r = 0; r < 3; ++r) c.offset[r] = c.impulse[r] = zero;
-    c.active = !(zero < zero);
+    c.active = !none<S>();
     return n_ - 1;
   }
   /// The contact touches only these shared dofs (ascending); its rows are then y(i)[k] at dof

@@ -186,7 +186,7 @@ STICKSLIP_INLINE void solve_slip(const LocalContact<S>& k, const Reduced<S>& r, 
     auto good = (next >= lo) & (next <= hi) & (v.dp > zero);
     // A slow tail (a step that creeps along the bracket's end) is cut short by every third
     // bisection.
-    if (n > 6 && n % 3 == 0) good = good & (zero > one);
+    if (n > 6 && n % 3 == 0) good = none<S>();
     const auto bisect = live & !good;
     S target = next;
     if (any(bisect)) target = select(good, next, bisect_angle(lo, hi));

@@ -37,8 +37,7 @@ STICKSLIP_INLINE Mask<S> is_jammed(const FactoredContact<S>& c, const S velocity
 /// Lanes with such contacts; velocities must be up to date (`certify`).
 template <class S>
 STICKSLIP_STAGE Mask<S> jammed_lanes(const FactoredProblem<S>& p, const JamLimits<S>& limits) {
-  const S zero = constant<S>(0);
-  auto jam = zero < zero;
+  auto jam = none<S>();
   for (int i = 0; i < p.size(); ++i)
     jam = jam | is_jammed(p.contact(i), p.contact(i).velocity, limits);
   return jam;

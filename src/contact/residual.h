@@ -21,12 +21,14 @@ STICKSLIP_INLINE S natural_map_residual_squared(const LocalContact<S>& k, const 
   const S lx = k.scale * lambda[0], ly = k.scale * lambda[1], lz = k.scale * lambda[2];
   const S x = lx - v[0], y = ly - v[1], z = lz - madd(k.mu, speed, v[2]);
   const S norm = sqrt(madd(x, x, y * y));
-  // Projection on the cone: inside, in the polar cone, or on the mantle.
-  const S along = madd(k.mu, norm, z) / madd(k.mu, k.mu, one);
+  // Projection on the cone: inside, in the polar cone, or on the mantle, there at height `along`
+  // and with f times the tangential part: two quotients by one division.
   const auto inside = (norm <= k.mu * z) & (z >= zero);  // z apart: without friction mu z = 0
   const auto polar = k.mu * norm <= -z;
-  const auto centered = norm > zero;
-  const S f = select(centered, k.mu * along / select(centered, norm, one), zero);
+  const auto off_axis = norm > zero;
+  const S length = select(off_axis, norm, one);
+  const S part = madd(k.mu, norm, z) / (madd(k.mu, k.mu, one) * length);
+  const S along = part * length, f = select(off_axis, k.mu * part, zero);
   const S px = select(inside, x, select(polar, zero, f * x));
   const S py = select(inside, y, select(polar, zero, f * y));
   const S pz = select(inside, z, select(polar, zero, along));
@@ -45,8 +47,7 @@ STICKSLIP_INLINE S natural_map_residual(const LocalContact<S>& k, const S v[3], 
 template <class S>
 STICKSLIP_INLINE S impulse_rounding(const LocalContact<S>& k, const S lambda[3]) {
   const S eps = constant<S>(sizeof(Value<S>) == 4 ? 2e-7 : 4e-16);
-  return eps * k.scale *
-         sqrt(lambda[0] * lambda[0] + lambda[1] * lambda[1] + lambda[2] * lambda[2]);
+  return eps * k.scale * (abs(lambda[0]) + abs(lambda[1]) + abs(lambda[2]));
 }
 
 }  // namespace stickslip::contact::inline STICKSLIP_KERNELS

@@ -46,10 +46,9 @@ STICKSLIP_INLINE void next_block_inward(const Bundle& b, int& slot, const F& f) 
   with_block_size(slot, size, f);
 }
 
-/// Diagonal of L from D, and the row U = F / sqrt(D).
+/// Diagonal of L from D and 1 / D, and the row U = F / sqrt(D). Returns 1 / sqrt(D).
 template <class W>
-STICKSLIP_INLINE W finish_row(W d, LinkState<W>& link, Spatial<W>& u) {
-  const W inverse = constant<W>(1) / d;
+STICKSLIP_INLINE W finish_row(W d, W inverse, LinkState<W>& link, Spatial<W>& u) {
   link.root = sqrt(d);
   link.inv_root = link.root * inverse;
   u = u * link.inv_root;
@@ -87,20 +86,23 @@ STICKSLIP_INLINE ArticulatedInertia<Wide<S>> factor_block(Tree<S>& t, int slot, 
     if constexpr (N > 1) m11 = m11 + load_lanes(diagonal, t.slots[slot + 1].joint);
     if constexpr (N > 2) m22 = m22 + load_lanes(diagonal, t.slots[slot + 2].joint);
   }
-  // M = L^T L from the last row, with the base columns F.
+  // M = L^T L from the last row, with the base columns F. The square roots stay off the chain from
+  // one row to the next: only the divisions are on it.
+  const W one = constant<W>(1);
   if constexpr (N > 2) {
-    const W inverse = finish_row(m22, link[2], u2), l21 = m21 * inverse, l20 = m20 * inverse;
-    link[2].inner[0] = l21, link[2].inner[1] = l20;
-    m11 = nmadd(l21, l21, m11), m10 = nmadd(l21, l20, m10), m00 = nmadd(l20, l20, m00);
-    u1 = nmadd(u2, l21, u1), u0 = nmadd(u2, l20, u0);
+    const W inverse = one / m22, by1 = m21 * inverse, by0 = m20 * inverse;
+    m11 = nmadd(by1, m21, m11), m10 = nmadd(by1, m20, m10), m00 = nmadd(by0, m20, m00);
+    u1 = nmadd(u2, by1, u1), u0 = nmadd(u2, by0, u0);
+    const W scale = finish_row(m22, inverse, link[2], u2);
+    link[2].inner[0] = m21 * scale, link[2].inner[1] = m20 * scale;
   }
   if constexpr (N > 1) {
-    const W inverse = finish_row(m11, link[1], u1), l10 = m10 * inverse;
-    link[1].inner[0] = l10;
-    m00 = nmadd(l10, l10, m00);
-    u0 = nmadd(u1, l10, u0);
+    const W inverse = one / m11, by0 = m10 * inverse;
+    m00 = nmadd(by0, m10, m00);
+    u0 = nmadd(u1, by0, u0);
+    link[1].inner[0] = m10 * finish_row(m11, inverse, link[1], u1);
   }
-  finish_row(m00, link[0], u0);
+  finish_row(m00, one / m00, link[0], u0);
   const ArticulatedInertia<W> all = articulated(inertia);
   if constexpr (N == 1) return without(all, u0);
   if constexpr (N == 2) return without(all, u1, u0);

@@ -35,6 +35,8 @@ struct Bundle {
 
 struct Slot {
   bool prismatic;
+  /// Other chains or shapes hang on a link: its pose and velocity are read after a walk.
+  bool carries;
   /// Where every lane's LinkConstants::rotation only renames axes: its column k is the parent's
   /// axis (k + renaming) % 3. Else -1.
   int renaming;

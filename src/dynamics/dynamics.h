@@ -6,11 +6,12 @@
 namespace stickslip::dynamics::inline STICKSLIP_KERNELS {
 
 /// Everything before the contacts of a semi-implicit step: positions, inertias, velocities, factor
-/// and x = L^-T (tau - h). The composite inertia is not made. Reads all of `in` but the linear
+/// and x = L^-T (tau - h). The composite inertia is not made, and in packs of environments poses
+/// and velocities are those of links that carry something only. Reads all of `in` but the linear
 /// velocity.
 template <class S>
 void compute_free_motion(Tree<S>& t, const WalkInput<S>& in) {
-  walk<kPositions | kInertias | kBias | kFactor | kSolveTransposed | kWrenches>(t, in);
+  walk<kPositions | kInertias | kBias | kFactor | kSolveTransposed | kWrenches | kLean>(t, in);
 }
 
 /// x = L^-T (-h) with the factor of these positions: compute_bias, then solve_lower_transposed.

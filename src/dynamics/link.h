@@ -39,10 +39,10 @@ STICKSLIP_INLINE Spatial<W> move_to_link(const LinkConstants<K>& c, const Slot& 
 
 /// (D5) at the pose of the link, from constants of the model or of each environment.
 template <class W, class K>
-STICKSLIP_INLINE void place_inertia(const LinkInertia<K>& c, LinkState<W>& link) {
-  const Mat3<W>& r = link.rotation;
+STICKSLIP_INLINE void place_inertia(const LinkInertia<K>& c, const Mat3<W>& r, const Vec3<W>& p,
+                                    LinkState<W>& link) {
   link.inertia.mass = W(c.mass);
-  store(madd(r, wide3<W>(c.com), link.position), link.inertia.com);
+  store(madd(r, wide3<W>(c.com), p), link.inertia.com);
   store(rotate(r, sym3(c.inertia)), link.inertia.rot);
 }
 

@@ -20,6 +20,7 @@ enum Part : unsigned {
   kFactor = 64,            // M + diag(diagonal) = L^T L
   kSolveTransposed = 128,  // x = L^-T (tau + forces on base and links)
   kWrenches = 256,         // adds wrenches to the forces on base and links
+  kLean = 512,             // keeps poses and velocities of links that carry something only
 };
 
 /// What a walk reads besides the tree; what none of its parts needs may stay unset.
@@ -63,6 +64,13 @@ STICKSLIP_INLINE void start_base(Tree<S>& t, const WalkInput<S>& in) {
 
 // ---- one chain of every bundle lane: outward
 
+/// Whether a walk stores pose and velocity of the links of a slot. A world's are few, and asked
+/// for.
+template <unsigned kParts, class S>
+STICKSLIP_INLINE bool keeps(const Slot& slot) {
+  return !(kParts & kLean) || Tree<S>::kLanes > 1 || slot.carries;
+}
+
 template <class S>
 void chain_positions(Tree<S>& t, const Bundle& b, const S* joints) {
   using W = Wide<S>;
@@ -82,10 +90,34 @@ void chain_inertias(Tree<S>& t, const Bundle& b) {
   const int end = b.first_slot + b.length;
   if (t.inertias)
     for (int slot = b.first_slot; slot < end; ++slot)
-      place_inertia(t.inertias[slot], t.links[slot]);
+      place_inertia(t.inertias[slot], t.links[slot].rotation, t.links[slot].position,
+                    t.links[slot]);
   else
     for (int slot = b.first_slot; slot < end; ++slot)
-      place_inertia(t.constants[slot].inertial, t.links[slot]);
+      place_inertia(t.constants[slot].inertial, t.links[slot].rotation, t.links[slot].position,
+                    t.links[slot]);
+}
+
+/// Both in one pass, so that the pose stays in registers. In packs of environments memory traffic
+/// counts: the links of one step do not fit into the first-level cache.
+template <unsigned kParts, class S>
+void chain_places(Tree<S>& t, const Bundle& b, const S* joints) {
+  using W = Wide<S>;
+  Mat3<W> r = from_parents<S, Mat3>(t, b, t.base.rotation, &LinkState<W>::rotation);
+  Vec3<W> p = from_parents<S, Vec3>(t, b, zero3<S>(), &LinkState<W>::position);
+  for (int slot = b.first_slot; slot < b.first_slot + b.length; ++slot) {
+    LinkState<W>& link = t.links[slot];
+    const Slot& s = t.slots[slot];
+    store(move_to_link(t.constants[slot], s, load_lanes(joints, s.joint), r, p), link.axis);
+    if (keeps<kParts, S>(s)) {
+      store(r, link.rotation);
+      store(p, link.position);
+    }
+    if (t.inertias)
+      place_inertia(t.inertias[slot], r, p, link);
+    else
+      place_inertia(t.constants[slot].inertial, r, p, link);
+  }
 }
 
 template <class S>
@@ -106,7 +138,7 @@ void chain_velocities(Tree<S>& t, const Bundle& b, const S* rates) {
   }
 }
 
-template <class S>
+template <unsigned kParts, class S>
 void chain_bias(Tree<S>& t, const Bundle& b, const S* rates) {
   using W = Wide<S>;
   Spatial<W> v = from_parents<S, Spatial>(t, b, t.base.velocity, &LinkState<W>::velocity);
@@ -115,7 +147,7 @@ void chain_bias(Tree<S>& t, const Bundle& b, const S* rates) {
   for (int slot = b.first_slot; slot <= last; ++slot) {
     LinkState<W>& link = t.links[slot];
     store(bias_of_link(link, load_lanes(rates, t.slots[slot].joint), v, a), link.force);
-    store(v, link.velocity);
+    if (keeps<kParts, S>(t.slots[slot])) store(v, link.velocity);
     if (slot == last && b.has_children) store(a, link.acceleration);
   }
 }
@@ -174,11 +206,16 @@ void chain_solve_transposed(Tree<S>& t, const Bundle& b, const S* tau, double sc
 
 template <unsigned kParts, class S>
 STICKSLIP_INLINE void walk_outward(Tree<S>& t, const Bundle& b, const WalkInput<S>& in) {
-  if constexpr (kParts & kPositions) chain_positions(t, b, in.joints);
-  if constexpr (kParts & kInertias) chain_inertias(t, b);
+  constexpr bool kPlaces = (kParts & kPositions) && (kParts & kInertias);
+  if constexpr (kPlaces)
+    chain_places<kParts>(t, b, in.joints);
+  else if constexpr (kParts & kPositions)
+    chain_positions(t, b, in.joints);
+  else if constexpr (kParts & kInertias)
+    chain_inertias(t, b);
   if constexpr (kParts & kComposite) add_composite(t, b);
   if constexpr (kParts & kBias)
-    chain_bias(t, b, in.rates);
+    chain_bias<kParts & kLean>(t, b, in.rates);
   else if constexpr (kParts & kVelocities)
     chain_velocities(t, b, in.rates);
   if constexpr (kParts & kWrenches)

@@ -48,6 +48,12 @@ STICKSLIP_INLINE S constant(double x) {
   return S(static_cast<Value<S>>(x));
 }
 
+/// No lane.
+template <class S>
+STICKSLIP_INLINE Mask<S> none() {
+  return Mask<S>{};
+}
+
 // One fused multiply-add a * b + c: always exactly one rounding, on every machine.
 STICKSLIP_INLINE double madd(double a, double b, double c) { return __builtin_fma(a, b, c); }
 STICKSLIP_INLINE float madd(float a, float b, float c) { return __builtin_fmaf(a, b, c); }

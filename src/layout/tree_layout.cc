@@ -80,6 +80,8 @@ TreeLayout::TreeLayout(const Model& model, int lanes_per_bundle)
   }
   link_of_body.resize(model.bodies().size());
   if (floating) base = model.bodies()[0].inertial;
+  std::vector<bool> has_shape(model.bodies().size(), false);
+  for (const Shape& s : model.shapes()) has_shape[s.body] = true;
 
   // Equal chains of one level, in the order of the model, side by side.
   std::map<std::pair<int, std::string>, std::vector<Chain>> groups;
@@ -99,6 +101,7 @@ TreeLayout::TreeLayout(const Model& model, int lanes_per_bundle)
           slot.joint[lane] = j;
           slot.parent[lane] = link_of_body[model.joints()[j].parent_body];
           if (lane < b.lanes) link_of_body[j + 1] = {num_slots + k, lane};
+          slot.carries = slot.carries || has_shape[j + 1];
         }
         slots.push_back(slot);
       }
@@ -109,7 +112,7 @@ TreeLayout::TreeLayout(const Model& model, int lanes_per_bundle)
           b.on_base = false;
           for (dynamics::Bundle& above : bundles)  // a chain ends where others hang on it
             if (above.first_slot + above.length - 1 == b.parent[lane].slot)
-              above.has_children = true;
+              above.has_children = slots[b.parent[lane].slot].carries = true;
         }
       }
       num_slots += b.length;

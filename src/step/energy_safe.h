@@ -36,7 +36,7 @@ class EnergySafeStep {
     const S dt = number(settings_.time_step),
             shortest = number(settings_.time_step / settings_.max_substeps);
     const S end = number(1e-9 * settings_.time_step);
-    robot_.info = LaneInfo<S>{none<S>(), none<S>(), number(0)};
+    robot_.info.clear();
     robot_.info.substeps = 0;
     if (!all(robot_.prepared_step > number(0))) start(dt);
     S left = dt;

@@ -40,11 +40,6 @@ STICKSLIP_INLINE void clear_where(Mask<S> m, int n, S* to) {
   else
     for (int k = 0; k < n; ++k) to[k] = select(m, zero, to[k]);
 }
-template <class S>
-STICKSLIP_INLINE Mask<S> none() {
-  const S o = constant<S>(0);
-  return o < o;
-}
 /// Lanes whose number is neither NaN nor infinite.
 template <class S>
 STICKSLIP_INLINE Mask<S> is_finite(S x) {

@@ -38,8 +38,7 @@ class OverlapCorrection {
   /// Leaves delta in L-space in the tree's x (zero in other lanes); lanes with a gap below
   /// -tolerance.
   Mask<S> run(dynamics::Tree<S>& tree, S tolerance) {
-    const S zero = constant<S>(0);
-    Mask<S> overlap = zero < zero;
+    Mask<S> overlap = none<S>();
     for (int i = 0; i < count_; ++i) overlap = overlap | (active_[i] & (gaps_[i] < -tolerance));
     if (!any(overlap)) return overlap;
     stride_ = contact::round_up(count_, kGroup);

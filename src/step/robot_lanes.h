@@ -36,7 +36,8 @@ struct LaneControl {
   Mask<S> drives_base;    // lanes with a generalized force on the floating base
 };
 
-/// What the last step did, per lane.
+/// What the last step did, per lane. Copied number by number: a load over masks that were just
+/// stored one by one waits until all stores before it are in the cache.
 template <class S>
 struct LaneInfo {
   Mask<S> unconverged;  // contact solve above its tolerance
@@ -45,6 +46,25 @@ struct LaneInfo {
   int contacts = 0;     // in the last solve; of all lanes together, like what follows
   int sweeps = 0, newton_steps = 0;
   int substeps = 1;
+
+  LaneInfo() = default;
+  LaneInfo(const LaneInfo& other) { *this = other; }
+  LaneInfo& operator=(const LaneInfo& other) {
+    unconverged = other.unconverged;
+    non_finite = other.non_finite;
+    residual = other.residual;
+    contacts = other.contacts;
+    sweeps = other.sweeps;
+    newton_steps = other.newton_steps;
+    substeps = other.substeps;
+    return *this;
+  }
+  void clear() {
+    unconverged = non_finite = none<S>();
+    residual = constant<S>(0);
+    contacts = sweeps = newton_steps = 0;
+    substeps = 1;
+  }
 };
 
 /// Contacts of each lane's last substep, per support point. A lane that is through while others

@@ -48,7 +48,7 @@ void step_semi_implicit(RobotLanes<S>& robot, const StepSettings& settings) {
   LaneState<S>& s = robot.state;
   const S zero = constant<S>(0), dt = constant<S>(settings.time_step);
   const int offset = robot.offset(), nq = tables.nq, nu = tables.nu;
-  robot.info = LaneInfo<S>{none<S>(), none<S>(), zero};
+  robot.info.clear();
 
   compute_free_motion(robot, settings.time_step);
   timer.end(kDynamics);

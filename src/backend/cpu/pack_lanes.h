@@ -94,8 +94,8 @@ void PackLanes<S>::lay_out(contact::Arena& arena, const PackScene& scene) {
   scratch_ = arena.take<S>(6 * t.num_bodies);
   contacts_ = {arena.take<S>(3 * t.num_points), arena.take<Mask<S>>(t.num_points)};
   step::LaneControl<S>& c = robot_.control;
-  c = {force_,  kp_,        target_, damping_, friction_,       nullptr,
-       nullptr, zero3<S>(), true,    false,    step::none<S>(), step::none<S>()};
+  c = {force_,  kp_,        target_, damping_, friction_, nullptr,
+       nullptr, zero3<S>(), true,    false,    none<S>(), none<S>()};
 }
 
 template <class S>
@@ -153,7 +153,7 @@ void PackLanes<S>::load(const EnvArrays& arrays, long first, long num_envs) {
   }
   robot_.prepared_step = constant<S>(0);
   robot_.contacts.forget();
-  unconverged_ = non_finite_ = step::none<S>();
+  unconverged_ = non_finite_ = none<S>();
   residual_ = steps_failed_ = constant<S>(0);
   steps_ = 0;
 }
@@ -166,10 +166,10 @@ void PackLanes<S>::check_state() {
   const step::RobotTables& t = *scene_.tables;
   step::LaneState<S>& s = robot_.state;
   const S zero = constant<S>(0), one = constant<S>(1), largest = constant<S>(step::kLargestJoint);
-  Mask<S> same = !step::none<S>();
+  Mask<S> same = !none<S>();
   for (int k = 0; k < t.nq; ++k) same = same & (s.q[k] >= last_q_[k]) & (s.q[k] <= last_q_[k]);
   for (int k = 0; k < t.nu; ++k) same = same & (s.u[k] >= last_u_[k]) & (s.u[k] <= last_u_[k]);
-  set_aside_ = step::none<S>();
+  set_aside_ = none<S>();
   if (all(same)) return;
   Mask<S> good = step::are_finite(s.q, t.nq) & step::are_finite(s.u, t.nu);
   const S* joints = robot_.joints(s.q);
@@ -210,7 +210,7 @@ void PackLanes<S>::load_control(const EnvArrays& arrays) {
   for (int j = 0; j < t.num_joints; ++j) set_aside_ = set_aside_ | !step::is_finite(target_[j]);
   c.gravity = {gravity_[0], gravity_[1], gravity_[2]};
   const auto some = [&](S x) { return !((x >= zero) & (x <= zero)); };  // also NaN
-  Mask<S> gains = step::none<S>(), forces = gains, on_base = gains, pushed = gains;
+  Mask<S> gains = none<S>(), forces = gains, on_base = gains, pushed = gains;
   for (int j = 0; j < t.num_joints; ++j) gains = gains | some(kp_[j]) | some(damping_[j]);
   if (t.damped)
     for (int j = 0; j < t.num_joints; ++j) damping_[j] = damping_[j] + constant<S>(t.damping[j]);

@@ -1,5 +1,6 @@
 // The dynamics kernels against each other and across scalars. Pinocchio is the outside oracle
 // (tests/python).
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <vector>
@@ -22,6 +23,7 @@ struct Robots {
   using W = Wide<S>;
   layout::TreeMemory<S> memory;
   Tree<S>& t;
+  std::vector<Slot> slots;
   std::vector<Spatial<W>> wrenches;
   std::vector<S> q, rates, extra, joints;
   S quaternion[4], base[6] = {};
@@ -31,6 +33,9 @@ struct Robots {
   Robots(const Model& model, const std::vector<std::vector<double>>& states)
       : memory(model), t(memory.tree()), gravity{S(0), S(0), constant<S>(-9.81)} {
     const int n = model.num_joints();
+    slots.assign(t.slots, t.slots + t.num_slots);
+    for (Slot& slot : slots) slot.carries = true;
+    t.slots = slots.data();
     q.resize(n), rates.resize(n), extra.resize(n), joints.resize(n);
     wrenches.assign(t.num_slots, {{W(3), W(2), W(1)}, {W(6), W(5), W(4)}});
     const auto load = [&](S& to, int k) {
@@ -178,6 +183,40 @@ void compare_fused() {
     for (int lane = 0; lane < ScalarTraits<S>::kWidth; ++lane)
       CHECK(get_lane(norm, lane) == get_lane(same, lane));
   }
+}
+
+/// A walk that keeps poses and velocities of links that carry something only, against one that
+/// keeps all.
+template <class S>
+void compare_lean() {
+  int left_out = 0;
+  for (const ModelPtr& model : robots()) {
+    std::vector<std::vector<double>> states;
+    for (int lane = 0; lane < ScalarTraits<S>::kWidth; ++lane)
+      states.push_back(random_state(*model, 50 + lane));
+    Robots<S> whole(*model, states), lean(*model, states);
+    const layout::TreeLayout& layout = lean.memory.layout();
+    const auto spoil = [](auto& x) {
+      auto* number = reinterpret_cast<Value<S>*>(&x);
+      std::fill_n(number, sizeof x / sizeof *number, Value<S>(NAN));
+    };
+    for (int slot = 0; slot < lean.t.num_slots; ++slot) {
+      lean.slots[slot].carries = layout.slots[slot].carries;
+      LinkState<Wide<S>>& link = lean.t.links[slot];
+      spoil(link.rotation), spoil(link.position), spoil(link.velocity);
+    }
+    compute_free_motion(whole.t, whole.input());
+    compute_free_motion(lean.t, lean.input());
+    for (int slot = 0; slot < lean.t.num_slots; ++slot) {
+      LinkState<Wide<S>>&from = whole.t.links[slot], &to = lean.t.links[slot];
+      if (!std::isnan(get_lane(to.position.x, 0))) continue;
+      CHECK(!layout.slots[slot].carries);
+      to.rotation = from.rotation, to.position = from.position, to.velocity = from.velocity;
+      ++left_out;
+    }
+    CHECK(numbers(whole, true) == numbers(lean, true));
+  }
+  CHECK((left_out > 0) == (Tree<S>::kLanes == 1));  // a world keeps all
 }
 
 /// Puts the mass properties of one lane (environment or branch) into `to`.
@@ -332,6 +371,12 @@ TEST(FusedPassesEqualSeparateOnesBitForBit) {
   compare_fused<Pack<double, 8>>();
   compare_fused<Pack<float, 8>>();
   compare_fused<Pack<float, 16>>();
+}
+
+TEST(PosesOfLinksThatCarryNothingAreNotMissed) {
+  compare_lean<double>();
+  compare_lean<Pack<double, 8>>();
+  compare_lean<Pack<float, 16>>();
 }
 
 TEST(RenamingAxesEqualsMultiplyingWithTheRotationThatDoes) {
