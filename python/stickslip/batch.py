@@ -412,7 +412,7 @@ class Batch(Profiled):
         self, name: str, value: ArrayLike, shape: tuple[int, ...], check: Callable[[str, Array], None] | None = None
     ) -> None:
         values = inputs.fitted(name, value, (self._num_envs, *shape))
-        if check is not None:
+        if check is not None and 0 not in shape:
             check(name, values)
         with np.errstate(over="ignore", invalid="ignore"):
             np.copyto(self._view(name), values, casting="same_kind")

@@ -180,6 +180,17 @@ def test_bad_numbers_for_all_are_named_once(batch: ss.Batch, name: str, value, s
     assert everything(batch) == before
 
 
+def test_values_for_columns_that_a_robot_does_not_have_are_no_error() -> None:
+    builder = ss.ModelBuilder("stone")
+    builder.add_link("stone", mass=1.0, inertia=0.1 * np.eye(3))
+    world = ss.World()
+    world.add_robot(builder.build())
+    batch = ss.Batch(world, 2)
+    batch.kp = -1.0
+    batch.friction = -1.0
+    assert batch.kp.shape == (2, 0) and batch.friction.shape == (2, 0)
+
+
 def test_numbers_too_large_for_float32_are_refused_as_parameters_and_flagged_as_inputs() -> None:
     batch = ss.Batch(anymal(), 3)
     with pytest.raises(ValueError, match=r"gravity: environment 2, axis 'x' is 1e\+300; too large for float32"):

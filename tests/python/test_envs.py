@@ -440,6 +440,12 @@ def test_actions_are_clipped_to_their_space() -> None:
             "pushes.seconds is .0, 1.; it must be",
         ),
         ({"config": AnymalFlatConfig(decimation=0)}, ValueError, "decimation is 0"),
+        ({"config": AnymalFlatConfig(episode_seconds=np.inf)}, ValueError, "episode_seconds is inf; it must be finite"),
+        (
+            {"config": AnymalFlatConfig(episode_seconds=0.001)},
+            ValueError,
+            "episode_seconds is 0.001; an action alone lasts 0.02 s",
+        ),
     ],
 )
 def test_wrong_options_are_named(options: dict[str, Any], error: type, words: str) -> None:

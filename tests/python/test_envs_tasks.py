@@ -69,6 +69,9 @@ def test_smallest_task_runs_in_every_mode_and_alone() -> None:
         ({"rewards": lambda self: np.zeros((3, 1))}, ValueError, r"rewards\(\): 'reward' has shape \(3, 1\)"),
         ({"terminations": lambda self: {"end": np.zeros(3)}}, TypeError, "'end' has dtype float64; bool"),
         ({"rewards": VectorTask.rewards}, NotImplementedError, r"Broken needs a method rewards\(\)"),
+        ({"observation_noise": np.nan}, ValueError, "observation_noise is nan; it must be finite"),
+        ({"observation_noise": np.ones(7)}, ValueError, r"observation_noise has shape \(7,\); it must be a number, or"),
+        ({"observation_noise": "much"}, TypeError, "observation_noise holds str"),
     ],
 )
 def test_mistakes_in_a_task_are_named(change: dict[str, Any], error: type, words: str) -> None:

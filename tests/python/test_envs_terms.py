@@ -219,6 +219,21 @@ def test_each_episode_draws_friction_and_mass() -> None:
     assert changed[:20].all() and not changed[20:].any()
 
 
+@pytest.mark.parametrize(
+    ("term", "words"),
+    [
+        (partial(randomization.friction, low=-0.1), "friction: low is -0.1; it must be zero or positive"),
+        (partial(randomization.friction, low=2.0), r"friction: \(low, high\) is .*; low must not exceed high"),
+        (partial(randomization.base_mass, low=-50.0), r"base_mass: low is -50\.0; the base has \d+\.\d+ kg"),
+        (partial(randomization.base_mass, high=np.nan), r"base_mass: \(low, high\) is"),
+    ],
+)
+def test_randomization_that_no_robot_can_have_is_named(term: Any, words: str) -> None:
+    envs = make(2, config=AnymalFlatConfig(randomization={"term": term}))
+    with pytest.raises(ValueError, match=words):
+        envs.reset(seed=0)
+
+
 def test_pushes_come_at_drawn_times() -> None:
     pushed: list[np.ndarray] = []
 

@@ -18,7 +18,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from stickslip._arguments import count
+from stickslip._arguments import count, number
 from stickslip._batch_inputs import numbers
 from stickslip.envs.infos import vector_info
 from stickslip.envs.streams import Envs, RandomStreams
@@ -119,8 +119,9 @@ class VectorTask(VectorEnv):
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
         self.metadata = dict(self.metadata, autoreset_mode=self.autoreset_mode)
         self._make_batch(dtype, num_threads, batch_options)
-        steps = round(self.episode_seconds / self.step_seconds) if max_episode_steps is None else max_episode_steps
-        self.max_episode_steps = count("max_episode_steps", steps, least=1)
+        if max_episode_steps is None:
+            max_episode_steps = self._steps_of_an_episode()
+        self.max_episode_steps = count("max_episode_steps", max_episode_steps, least=1)
         self._allocate()
         self.setup()
         self._make_spaces()
@@ -138,6 +139,12 @@ class VectorTask(VectorEnv):
         if self.action_size is None:
             self.action_size = self.batch.model.num_joints
 
+    def _steps_of_an_episode(self) -> int:
+        seconds = number("episode_seconds", self.episode_seconds)
+        if not round(seconds / self.step_seconds) >= 1:
+            raise ValueError(f"episode_seconds is {seconds}; an action alone lasts {self.step_seconds:.6g} s")
+        return round(seconds / self.step_seconds)
+
     def _allocate(self) -> None:
         self.random = RandomStreams(self.num_envs)
         self.actions = np.zeros((self.num_envs, self.action_size), np.float32)
@@ -154,7 +161,7 @@ class VectorTask(VectorEnv):
             raise ValueError(f"observe() returned shape {shape}; it must be ({self.num_envs}, size)")
         self._observation = np.zeros(shape, np.float32)
         if self.observation_noise is not None:
-            self.observation_noise = np.broadcast_to(np.asarray(self.observation_noise, np.float32), shape[1:])
+            self.observation_noise = _noise(self.observation_noise, shape[1:])
         limit, action = np.float32(self.observation_limit), np.float32(self.action_limit)
         self.single_observation_space = Box(-limit, limit, shape[1:], np.float32)
         self.single_action_space = Box(-action, action, (self.action_size,), np.float32)
@@ -416,6 +423,16 @@ def _seed(name: str, value: Any) -> int:
     if result < 0:
         raise ValueError(f"{name} is {result}; it must be zero or positive")
     return result
+
+
+def _noise(value: ArrayLike, shape: tuple[int, ...]) -> Array:
+    """Finite numbers, one per element of an observation."""
+    given = numbers("observation_noise", value).astype(np.float32)
+    if given.shape not in ((), shape):
+        raise ValueError(f"observation_noise has shape {given.shape}; it must be a number, or {shape}: one per element")
+    if not np.isfinite(given).all():
+        raise ValueError(f"observation_noise is {value}; it must be finite")
+    return np.broadcast_to(given, shape)
 
 
 def _autoreset_mode(value: AutoresetMode | str) -> AutoresetMode:
