@@ -100,7 +100,8 @@ class Batch {
   const std::vector<int>& contact_shapes() const;  ///< of the model, columns of kFriction
   std::size_t memory_bytes() const;                ///< held by the batch now
 
-  /// The array; parameters get their memory on first use. Throws ModelError where memory is short.
+  /// The array; parameters get their memory on first use. Throws ModelError where memory is short,
+  /// or, on first use, where another thread is at work on the batch.
   BatchArray array(BatchField field);
 
   /// Advances every environment by `steps` time steps; returns the status bits of all, or-ed. An

@@ -24,11 +24,9 @@ struct FactoredOptions {
   double tolerance_absolute = 1e-9;  ///< stop: velocity change of a sweep [m/s] ...
   double tolerance_relative = 1e-8;  ///< ... plus this much of the largest free contact velocity
   double residual_tolerance = 1e-8;  ///< converged: largest residual at most this [m/s]
-  double residual_relative =
-      0;  ///< ... plus this much of the largest free contact velocity (float needs it)
-  double alpha = 3e-8;       ///< proximal weight of Newton steps ...
-  double alpha_late = 1e-4;  ///< ... and of late ones
-  int late = 9;              ///< from this sweep on, a step after each
+  double alpha = 3e-8;               ///< proximal weight of Newton steps ...
+  double alpha_late = 1e-4;          ///< ... and of late ones
+  int late = 9;                      ///< from this sweep on, a step after each
   double enough = 1e-3;  ///< done: residual where the certificate is asked, in terms of the allowed
   int max_sweeps = 24;   ///< before the fallback
   int max_dissipation_sweeps = 1600;
@@ -61,7 +59,6 @@ FactoredOptions default_options() {
 template <class S>
 struct FactoredInfo {
   S residual;         // largest of the contacts [m/s]
-  S allowed;          // what it may be [m/s]
   Mask<S> converged;  // residual within tolerance; false where an input is not finite (then the
                       // impulses are zero)
   int sweeps = 0;     // passes over all contacts
@@ -71,9 +68,11 @@ struct FactoredInfo {
   int fallback_steps = 0;
 };
 
-/// |G_ii (lambda_i - local_i)| [m/s]: what is left where the sliding law is maximum dissipation.
+/// |G_ii (lambda_i - local_i)|^2 [m^2/s^2]: what is left where the sliding law is maximum
+/// dissipation.
 template <class S>
-STICKSLIP_INLINE S fixed_point_residual(const LocalContact<S>& k, const S v[3], const S l[3]) {
+STICKSLIP_INLINE S fixed_point_residual_squared(const LocalContact<S>& k, const S v[3],
+                                                const S l[3]) {
   S free[3], best[3], d[3];
   int evaluations;
   apply_block(k, l, free);
@@ -81,17 +80,19 @@ STICKSLIP_INLINE S fixed_point_residual(const LocalContact<S>& k, const S v[3], 
   solve_halley<true>(k, free, sizeof(Value<S>) == 4 ? 1e-6 : 1e-13, best, evaluations);
   for (int r = 0; r < 3; ++r) best[r] = l[r] - best[r];
   apply_block(k, best, d);
-  return sqrt(madd(d[0], d[0], madd(d[1], d[1], d[2] * d[2])));
+  return madd(d[0], d[0], madd(d[1], d[1], d[2] * d[2]));
 }
 
-/// Largest residual of the contacts [m/s]; writes their velocities. Four contacts at a time for a
-/// plain scalar.
+/// Largest residual of the contacts, plus the most that the rounding of an impulse hides [m/s], so
+/// that there is one root for all; writes their velocities. Four contacts at a time for a plain
+/// scalar.
 template <int M, bool kMaxDissipation, class S>
 STICKSLIP_STAGE S certify(FactoredProblem<S>& p) {
   constexpr int kLanes = kMaxDissipation ? 1 : kChunk<S>;
   using T = typename ChunkOf<S, kLanes != 1>::Type;
   const int n = p.size();
-  T worst = constant<T>(0), spoiled = constant<T>(0);  // NaN once a residual is not finite
+  // The second: NaN once a residual is not finite.
+  T worst_squared = constant<T>(0), spoiled = constant<T>(0), rounding = constant<T>(0);
   for (int first = 0; first < n; first += kLanes) {
     LocalContact<T> k;
     T v[3], l[3];
@@ -109,24 +110,25 @@ STICKSLIP_STAGE S certify(FactoredProblem<S>& p) {
         put(k.mu, c.local.mu);
       }
     }
-    T e;
+    T square;
     if constexpr (kMaxDissipation)
-      e = fixed_point_residual(k, v, l);
+      square = fixed_point_residual_squared(k, v, l);
     else
-      e = natural_map_residual(k, v, l);
-    e = e + impulse_rounding(k, l);
-    worst = max(worst, e);
-    spoiled = madd(constant<T>(0), e, spoiled);
+      square = natural_map_residual_squared(k, v, l);
+    worst_squared = max(worst_squared, square);
+    rounding = max(rounding, impulse_rounding(k, l));
+    spoiled = madd(constant<T>(0), square, spoiled);
   }
   if constexpr (kLanes == 1) {
-    return worst + spoiled;
+    return sqrt(worst_squared) + rounding + spoiled;
   } else {
-    S most = get_lane(worst, 0), all = get_lane(spoiled, 0);
+    S most = get_lane(worst_squared, 0), hidden = get_lane(rounding, 0), all = get_lane(spoiled, 0);
     for (int j = 1; j < kLanes; ++j) {
-      most = max(most, get_lane(worst, j));
+      most = max(most, get_lane(worst_squared, j));
+      hidden = max(hidden, get_lane(rounding, j));
       all = all + get_lane(spoiled, j);
     }
-    return most + all;
+    return sqrt(most) + hidden + all;
   }
 }
 
@@ -152,11 +154,11 @@ struct Outcome {
 /// change little; or the cap.
 template <int M, bool kMaxDissipation, class S>
 STICKSLIP_STAGE Outcome<S> iterate(FactoredProblem<S>& p, Mask<S> live, S tolerance_squared,
-                                   S enough, bool foresee, const FactoredOptions& o,
-                                   FactoredInfo<S>& info) {
+                                   bool foresee, const FactoredOptions& o, FactoredInfo<S>& info) {
   constexpr int kEvery = 3;
   Outcome<S> out;
-  const S speed = constant<S>(0.1) * sqrt(tolerance_squared);
+  const S tolerance = sqrt(tolerance_squared), speed = constant<S>(0.1) * tolerance;
+  const S enough = min(constant<S>(o.enough * o.residual_tolerance), tolerance);
   S before = constant<S>(1e30);
   Mask<S> only_swept = live;
   out.foreseen = none<S>();
@@ -272,16 +274,13 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
   accumulate<M>(p);
   const S relative = constant<S>(o.tolerance_relative),
           absolute = constant<S>(o.tolerance_absolute);
-  const S allowed =
-      madd(constant<S>(o.residual_relative), sqrt(fastest), constant<S>(o.residual_tolerance));
+  const S allowed = constant<S>(o.residual_tolerance);
   // The change of a sweep says little below what the residual has to reach.
   const S tolerance_squared =
       min(madd(relative * relative, fastest, absolute * absolute), allowed * allowed);
-  const S enough = min(constant<S>(o.enough) * allowed, sqrt(tolerance_squared));
   // False for NaN, and where products of block entries would overflow.
   const auto finite = sum < constant<S>(sizeof(Value<S>) == 4 ? 1e14 : 1e30);
-  Outcome<S> out =
-      iterate<M, kMaxDissipation>(p, finite, tolerance_squared, enough, o.foresee, o, info);
+  Outcome<S> out = iterate<M, kMaxDissipation>(p, finite, tolerance_squared, o.foresee, o, info);
   // Which of the lanes are not solved. The residuals of others stay: float would evaluate them anew
   // without double's help.
   S worst = zero;
@@ -297,7 +296,7 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
   };
   auto bad = unsolved(finite);
   if (const auto again = bad & out.foreseen; any(again)) {
-    out = iterate<M, kMaxDissipation>(p, again, tolerance_squared, enough, false, o, info);
+    out = iterate<M, kMaxDissipation>(p, again, tolerance_squared, false, o, info);
     ++info.resumed;
     bad = (bad & !again) | unsolved(again);
   }
@@ -308,7 +307,6 @@ void solve_factored_as(FactoredProblem<S>& p, const FactoredOptions& o, Factored
   if (any(bad) && release_jams<M, kMaxDissipation>(p, bad, sqrt(fastest), allowed)) unsolved(bad);
   worst = select(finite, worst, constant<S>(__builtin_nan("")));
   info.residual = worst;
-  info.allowed = allowed;
   info.converged = finite & (worst <= allowed);
   for (int i = 0; i < p.size(); ++i) {
     FactoredContact<S>& c = p.contact(i);

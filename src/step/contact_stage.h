@@ -138,8 +138,7 @@ class ContactStage {
   HostSolver::Effort ask_host(const HostSolver& host, contact::FactoredProblem<double>& p,
                               double tolerance);
   void solve_by_method(const HostSolver& host, LaneInfo<S>& info);
-  void solve_by_chain(const HostSolver& host, Mask<S> lanes, double tolerance, S allowed,
-                      LaneInfo<S>& info);
+  void solve_by_chain(const HostSolver& host, Mask<S> lanes, double tolerance, LaneInfo<S>& info);
 
   const RobotTables* tables_;
   ActiveContact<S>* active_;

@@ -224,7 +224,7 @@ void ContactStage<S>::solve(const StepSettings& settings, Mask<S> live, LaneInfo
     info.unconverged = live & !found.converged;
     const Mask<S> open = info.unconverged & is_finite(found.residual);
     if (any(open) && settings.host.solve && !o.max_dissipation)
-      solve_by_chain(settings.host, open, o.residual_tolerance, found.allowed, info);
+      solve_by_chain(settings.host, open, o.residual_tolerance, info);
   }
   info.contacts = count_;
   for (int i = 0; i < count_; ++i)  // a zero is +0, whichever way it came about
@@ -346,7 +346,7 @@ void ContactStage<S>::solve_by_method(const HostSolver& host, LaneInfo<S>& info)
 /// solver ended above its tolerance.
 template <class S>
 void ContactStage<S>::solve_by_chain(const HostSolver& host, Mask<S> lanes, double tolerance,
-                                     S allowed, LaneInfo<S>& info) {
+                                     LaneInfo<S>& info) {
   const S zero = constant<S>(0);
   S solved = zero;
   contact::solve_lanes(problem_, lanes, [&](contact::FactoredProblem<double>& p, int lane) {
@@ -357,7 +357,8 @@ void ContactStage<S>::solve_by_chain(const HostSolver& host, Mask<S> lanes, doub
   });
   const S residual = contact::certify_impulses(problem_);
   info.residual = select(lanes, residual, info.residual);
-  info.unconverged = info.unconverged & !(lanes & (solved > zero) & (residual <= allowed));
+  info.unconverged =
+      info.unconverged & !(lanes & (solved > zero) & (residual <= constant<S>(tolerance)));
 }
 
 template <class S>

@@ -68,6 +68,20 @@ def test_two_threads_on_one_batch_are_told() -> None:
     assert errors and all("another thread is at work on this batch" in error for error in errors)
 
 
+def test_first_use_of_a_parameter_during_a_step_is_told() -> None:
+    batch = ss.Batch(anymal(), 64, num_threads=1)
+    stepping = threading.Thread(target=batch.step, args=(20000,))
+    stepping.start()
+    time.sleep(0.02)
+    for name in ("body_mass", "kp", "generalized_force", "external_wrench"):
+        with pytest.raises(ValueError, match="another thread is at work on this batch"):
+            getattr(batch, name)
+    assert batch.q.shape == (64, 19)  # which is there already
+    assert stepping.is_alive()
+    stepping.join(60)
+    assert batch.body_mass.min() > 0 and not batch.generalized_force.any()
+
+
 def test_interrupt_ends_a_long_call(ball: ss.Model) -> None:
     world = ss.World()
     world.add_robot(ball)
