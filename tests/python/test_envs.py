@@ -17,7 +17,7 @@ from gymnasium.wrappers import vector as wrappers
 
 import stickslip as ss
 from env_runs import ID, MODES, actions_of, assert_same_steps, lively, make, run
-from stickslip.envs import AnymalFlat, AnymalFlatConfig, rewards
+from stickslip.envs import AnymalFlat, AnymalFlatConfig, observations, rewards
 from stickslip.envs.commands import Commands
 from stickslip.envs.randomization import Pushes
 
@@ -415,6 +415,30 @@ def test_actions_are_clipped_to_their_space() -> None:
         ({"config": {"kp": 3}}, TypeError, "config is a dict; an AnymalFlatConfig"),
         ({"config": AnymalFlatConfig(stance={"LF_HAA": 0.0})}, ValueError, "stance must have one angle for each"),
         ({"config": AnymalFlatConfig(rewards={"alive": rewards.alive})}, TypeError, "rewards: 'alive'"),
+        (
+            {"config": AnymalFlatConfig(rewards={"alive": ("much", rewards.alive)})},
+            TypeError,
+            "rewards: the weight of 'alive' is 'much'",
+        ),
+        (
+            {"config": AnymalFlatConfig(observations={"speed": observations.joint_velocity})},
+            TypeError,
+            "observations: 'speed' is .*ObservationTerm",
+        ),
+        ({"config": AnymalFlatConfig(randomization=None)}, TypeError, "randomization is a NoneType; a dict"),
+        (
+            {"config": AnymalFlatConfig(randomization={"mass": 3.0})},
+            TypeError,
+            "randomization: 'mass' is 3.0; a function",
+        ),
+        (
+            {"config": AnymalFlatConfig(terminations={"fall": None})},
+            TypeError,
+            "terminations: 'fall' is None; a function",
+        ),
+        ({"config": AnymalFlatConfig(initial_state=None)}, TypeError, "initial_state is None; a function"),
+        ({"config": AnymalFlatConfig(action_limit=0.0)}, ValueError, "action_limit is 0.0; it must be positive"),
+        ({"config": AnymalFlatConfig(action_scale=np.nan)}, ValueError, "action_scale is nan; it must be finite"),
         ({"config": AnymalFlatConfig(commands={"forward": (0, 1)})}, TypeError, "commands is a dict; a .*Commands is"),
         (
             {"config": AnymalFlatConfig(commands=Commands(left=(1, -1)))},

@@ -269,6 +269,14 @@ def test_user_replaces_terms_by_configuration() -> None:
     assert np.allclose(infos["reward_terms"]["high"], reward)
 
 
+def test_reward_of_another_shape_is_named() -> None:
+    for term in (lambda state: 1.0, lambda state: state.commands):
+        envs = make(2, config=quiet(rewards={"odd": (1.0, term)}))
+        envs.reset(seed=0)
+        with pytest.raises(ValueError, match=r"rewards\(\): 'odd' has shape .*; it must be \(2,\)"):
+            envs.step(np.zeros((2, 12), np.float32))
+
+
 def test_only_positive_rewards_cuts_at_zero() -> None:
     for only in (False, True):
         envs = make(2, config=quiet(rewards={"bad": (-1.0, rewards.alive)}, only_positive_rewards=only))

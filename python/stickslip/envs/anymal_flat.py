@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip import assets
+from stickslip._arguments import number
 from stickslip.envs.commands import Commands, uniform_commands
 from stickslip.envs.locomotion_state import Array, ContactColumns, LocomotionState, Mask
 from stickslip.envs.observations import ObservationTerm, default_observations
@@ -68,6 +69,47 @@ class AnymalFlatConfig:
     randomization: dict[str, Randomization] = field(default_factory=default_randomization)
     pushes: Pushes | None = field(default_factory=Pushes)
 
+    def check(self) -> None:
+        """TypeError or ValueError names the field that cannot be."""
+        self._check_terms()
+        if not isinstance(self.commands, Commands):
+            kind = type(self.commands).__name__
+            raise TypeError(f"commands is a {kind}; a stickslip.envs.commands.Commands is wanted")
+        self.commands.check()
+        if not isinstance(self.pushes, (Pushes, type(None))):
+            kind = type(self.pushes).__name__
+            raise TypeError(f"pushes is a {kind}; a stickslip.envs.randomization.Pushes or None is wanted")
+        if self.pushes is not None:
+            self.pushes.check()
+        for name in ("action_scale", "base_height"):
+            number(name, getattr(self, name))
+        for name in ("action_limit", "observation_limit"):
+            if not number(name, getattr(self, name)) > 0:
+                raise ValueError(f"{name} is {getattr(self, name)}; it must be positive")
+
+    def _check_terms(self) -> None:
+        for where in ("observations", "rewards", "terminations", "randomization"):
+            terms = getattr(self, where)
+            if not isinstance(terms, dict):
+                raise TypeError(
+                    f"{where} is a {type(terms).__name__}; a dict of terms by name is wanted, {{}} for none"
+                )
+        for name, term in self.observations.items():
+            if not isinstance(term, tuple) or not 1 <= len(term) <= 3 or not callable(term[0]):
+                raise TypeError(
+                    f"observations: {name!r} is {term!r}; an ObservationTerm(function, scale, noise) is wanted"
+                )
+        for name, term in self.rewards.items():
+            if not isinstance(term, tuple) or len(term) != 2 or not callable(term[1]):
+                raise TypeError(f"rewards: {name!r} is {term!r}; a tuple (weight, function) is wanted")
+            number(f"rewards: the weight of {name!r}", term[0])
+        functions = {f"terminations: {name!r}": term for name, term in self.terminations.items()}
+        functions |= {f"randomization: {name!r}": term for name, term in self.randomization.items()}
+        functions |= {"initial_state": self.initial_state, "draw_commands": self.draw_commands}
+        for name, function in functions.items():
+            if not callable(function):
+                raise TypeError(f"{name} is {function!r}; a function is wanted")
+
 
 class AnymalFlat(VectorTask):
     """ANYmal on flat ground, driven by joint targets, rewarded for walking at the commanded velocity."""
@@ -76,18 +118,7 @@ class AnymalFlat(VectorTask):
         self.config = c = AnymalFlatConfig() if config is None else config
         if not isinstance(c, AnymalFlatConfig):
             raise TypeError(f"config is a {type(c).__name__}; an AnymalFlatConfig is wanted")
-        for name, term in c.rewards.items():
-            if not isinstance(term, tuple) or len(term) != 2 or not callable(term[1]):
-                raise TypeError(f"rewards: {name!r} is {term!r}; a tuple (weight, function) is wanted")
-        if not isinstance(c.commands, Commands):
-            raise TypeError(f"commands is a {type(c.commands).__name__}; a stickslip.envs.commands.Commands is wanted")
-        c.commands.check()
-        if not isinstance(c.pushes, (Pushes, type(None))):
-            raise TypeError(
-                f"pushes is a {type(c.pushes).__name__}; a stickslip.envs.randomization.Pushes or None is wanted"
-            )
-        if c.pushes is not None:
-            c.pushes.check()
+        c.check()
         self.time_step, self.decimation, self.episode_seconds = c.time_step, c.decimation, c.episode_seconds
         self.action_limit, self.observation_limit = c.action_limit, c.observation_limit
         self.only_positive_rewards = c.only_positive_rewards
@@ -234,7 +265,9 @@ class AnymalFlat(VectorTask):
         """Weighted terms of the control step."""
         rows: dict[str, Array] = {}
         for row, (name, (weight, function)) in zip(self._reward_terms, self.config.rewards.items(), strict=True):
-            np.multiply(function(self.state), np.float32(weight * self.step_seconds), out=row)
+            term = function(self.state)
+            self._check_term("rewards", name, term)
+            np.multiply(term, np.float32(weight * self.step_seconds), out=row)
             rows[name] = row
         return rows
 
