@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -54,6 +54,9 @@ class Robot:
 
     def __repr__(self) -> str:
         return f"<stickslip.Robot {self.name!r}: {self.nu} degrees of freedom, {self.mass:.4g} kg>"
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("a Robot belongs to its World and can be neither copied nor pickled; pass q and u")
 
     @property
     def name(self) -> str:
@@ -313,6 +316,12 @@ class World(Profiled):
         self._method, self._law = method, law
         self._robots: list[Robot] = []
         self._stepper: _core.World | Recorder = self._core
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError(  # for copy, deepcopy and pickle alike
+            "a World can be neither copied nor pickled; make another one in the same way, and pass the state with "
+            "save_state() and load_state()"
+        )
 
     def __repr__(self) -> str:
         robots = ", ".join(robot.name for robot in self._robots) or "no robots"

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import functools
+import pickle
 import runpy
 import warnings
 from pathlib import Path
@@ -97,6 +99,12 @@ def test_reward_that_is_not_finite_ends_that_episode_only(mode: str) -> None:
         assert not told["non_finite_reward"]["one"].any()
     ended = infos["final_info"] if mode == "SameStep" else infos
     assert ended["reward_terms"]["one"][1] == ended["reward_terms"]["bad"][1] == 1.0
+
+
+@pytest.mark.parametrize("act", [copy.copy, copy.deepcopy, pickle.dumps])
+def test_copies_are_refused_with_advice(act: Any) -> None:
+    with pytest.raises(TypeError, match="a Falling can be neither copied nor pickled; make another one"):
+        act(Falling(2))
 
 
 def test_terms_may_be_lists() -> None:

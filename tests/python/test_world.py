@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import gc
+import pickle
 import warnings
 
 import numpy as np
@@ -75,6 +77,15 @@ def test_options_of_a_wrong_type_are_type_errors() -> None:
         ss.World(time_step="fast")
     with pytest.raises(TypeError, match=r"max_sweeps is 1\.5"):
         ss.World(max_sweeps=1.5)
+
+
+@pytest.mark.parametrize("act", [copy.copy, copy.deepcopy, pickle.dumps])
+def test_copies_are_refused_with_advice(ball: ss.Model, act) -> None:
+    world, robot = resting_ball(ball)
+    with pytest.raises(TypeError, match="neither copied nor pickled; make another one .* save_state"):
+        act(world)
+    with pytest.raises(TypeError, match="belongs to its World and can be neither copied nor pickled"):
+        act(robot)
 
 
 def test_second_ground_is_refused() -> None:

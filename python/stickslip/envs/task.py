@@ -168,6 +168,11 @@ class VectorTask(VectorEnv):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
 
+    def __reduce__(self) -> Any:
+        raise TypeError(  # for copy, deepcopy and pickle alike
+            f"a {type(self).__name__} can be neither copied nor pickled; make another one with the same arguments"
+        )
+
     # Gymnasium
 
     def reset(
