@@ -71,37 +71,20 @@ STICKSLIP_INLINE bool keeps(const Slot& slot) {
   return !(kParts & kLean) || Tree<S>::kLanes > 1 || slot.carries;
 }
 
+/// The inertia of a slot's links at their pose.
 template <class S>
-void chain_positions(Tree<S>& t, const Bundle& b, const S* joints) {
-  using W = Wide<S>;
-  Mat3<W> r = from_parents<S, Mat3>(t, b, t.base.rotation, &LinkState<W>::rotation);
-  Vec3<W> p = from_parents<S, Vec3>(t, b, zero3<S>(), &LinkState<W>::position);
-  for (int slot = b.first_slot; slot < b.first_slot + b.length; ++slot) {
-    LinkState<W>& link = t.links[slot];
-    const Slot& s = t.slots[slot];
-    store(move_to_link(t.constants[slot], s, load_lanes(joints, s.joint), r, p), link.axis);
-    store(r, link.rotation);
-    store(p, link.position);
-  }
-}
-
-template <class S>
-void chain_inertias(Tree<S>& t, const Bundle& b) {
-  const int end = b.first_slot + b.length;
+STICKSLIP_INLINE void place_inertia(Tree<S>& t, int slot, const Mat3<Wide<S>>& r,
+                                    const Vec3<Wide<S>>& p) {
   if (t.inertias)
-    for (int slot = b.first_slot; slot < end; ++slot)
-      place_inertia(t.inertias[slot], t.links[slot].rotation, t.links[slot].position,
-                    t.links[slot]);
+    place_inertia(t.inertias[slot], r, p, t.links[slot]);
   else
-    for (int slot = b.first_slot; slot < end; ++slot)
-      place_inertia(t.constants[slot].inertial, t.links[slot].rotation, t.links[slot].position,
-                    t.links[slot]);
+    place_inertia(t.constants[slot].inertial, r, p, t.links[slot]);
 }
 
-/// Both in one pass, so that the pose stays in registers. In packs of environments memory traffic
-/// counts: the links of one step do not fit into the first-level cache.
+/// With inertias in one pass, so that the pose stays in registers. In packs of environments memory
+/// traffic counts: the links of one step do not fit into the first-level cache.
 template <unsigned kParts, class S>
-void chain_places(Tree<S>& t, const Bundle& b, const S* joints) {
+void chain_positions(Tree<S>& t, const Bundle& b, const S* joints) {
   using W = Wide<S>;
   Mat3<W> r = from_parents<S, Mat3>(t, b, t.base.rotation, &LinkState<W>::rotation);
   Vec3<W> p = from_parents<S, Vec3>(t, b, zero3<S>(), &LinkState<W>::position);
@@ -113,11 +96,14 @@ void chain_places(Tree<S>& t, const Bundle& b, const S* joints) {
       store(r, link.rotation);
       store(p, link.position);
     }
-    if (t.inertias)
-      place_inertia(t.inertias[slot], r, p, link);
-    else
-      place_inertia(t.constants[slot].inertial, r, p, link);
+    if constexpr (kParts & kInertias) place_inertia(t, slot, r, p);
   }
+}
+
+template <class S>
+void chain_inertias(Tree<S>& t, const Bundle& b) {
+  for (int slot = b.first_slot; slot < b.first_slot + b.length; ++slot)
+    place_inertia(t, slot, t.links[slot].rotation, t.links[slot].position);
 }
 
 template <class S>
@@ -206,11 +192,8 @@ void chain_solve_transposed(Tree<S>& t, const Bundle& b, const S* tau, double sc
 
 template <unsigned kParts, class S>
 STICKSLIP_INLINE void walk_outward(Tree<S>& t, const Bundle& b, const WalkInput<S>& in) {
-  constexpr bool kPlaces = (kParts & kPositions) && (kParts & kInertias);
-  if constexpr (kPlaces)
-    chain_places<kParts>(t, b, in.joints);
-  else if constexpr (kParts & kPositions)
-    chain_positions(t, b, in.joints);
+  if constexpr (kParts & kPositions)
+    chain_positions<kParts&(kInertias | kLean)>(t, b, in.joints);
   else if constexpr (kParts & kInertias)
     chain_inertias(t, b);
   if constexpr (kParts & kComposite) add_composite(t, b);
