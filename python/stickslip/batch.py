@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -119,7 +119,7 @@ class Batch(Profiled):
                 raise
             raise type(error)(f"{error}; an operator such as += has put its result into the array already") from None
 
-    def __reduce__(self) -> Any:
+    def __reduce__(self) -> NoReturn:
         raise TypeError(  # for copy, deepcopy and pickle alike
             "a Batch can be neither copied nor pickled; make another one of the same world, and pass the state with "
             "save_state() and load_state()"

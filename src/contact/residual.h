@@ -28,7 +28,7 @@ STICKSLIP_INLINE S natural_map_residual_squared(const LocalContact<S>& k, const 
   const auto off_axis = norm > zero;
   const S length = select(off_axis, norm, one);
   const S part = madd(k.mu, norm, z) / (madd(k.mu, k.mu, one) * length);
-  const S along = part * length, f = select(off_axis, k.mu * part, zero);
+  const S along = part * length, f = k.mu * part;
   const S px = select(inside, x, select(polar, zero, f * x));
   const S py = select(inside, y, select(polar, zero, f * y));
   const S pz = select(inside, z, select(polar, zero, along));

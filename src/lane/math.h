@@ -55,6 +55,33 @@ STICKSLIP_INLINE void sincos(S x, S& sine, S& cosine) {
   cosine = select((quadrant > c(0.5)) | (quadrant < c(-1.5)), -q, q);
 }
 
+/// cos t and sin(t) / t from t^2. Where |t| < 1/4 from their series, which need no root, no
+/// division and no quadrant: error below 7e-17 in double, 3.5e-8 in float; beyond, up to |t| = 3,
+/// 4e-16 and 2e-7.
+template <class S>
+STICKSLIP_INLINE void cos_and_sinc(S t2, S& cosine, S& sinc) {
+  const auto c = [](double k) { return constant<S>(k); };
+  const S one = c(1);
+  S a = madd(t2, c(1.0 / 479001600), c(-1.0 / 3628800));
+  a = madd(t2, a, c(1.0 / 40320));
+  a = madd(t2, a, c(-1.0 / 720));
+  a = madd(t2, a, c(1.0 / 24));
+  a = madd(t2, a, c(-1.0 / 2));
+  cosine = madd(t2, a, one);
+  S b = madd(t2, c(-1.0 / 39916800), c(1.0 / 362880));
+  b = madd(t2, b, c(-1.0 / 5040));
+  b = madd(t2, b, c(1.0 / 120));
+  b = madd(t2, b, c(-1.0 / 6));
+  sinc = madd(t2, b, one);
+  const auto large = !(t2 < c(1.0 / 16));
+  if (!any(large)) return;
+  const S t = select(large, sqrt(t2), one);
+  S s, k;
+  sincos(t, s, k);
+  cosine = select(large, k, cosine);
+  sinc = select(large, s / t, sinc);
+}
+
 /// atan2(y, x) in (-pi, pi], double precision only: |error| below 2 ulp. atan2(0, 0) = 0.
 /// Reduction to |t| < 0.66 with a single division, then the rational approximation of Cephes.
 template <class S>

@@ -81,7 +81,8 @@ TreeLayout::TreeLayout(const Model& model, int lanes_per_bundle)
   link_of_body.resize(model.bodies().size());
   if (floating) base = model.bodies()[0].inertial;
   std::vector<bool> has_shape(model.bodies().size(), false);
-  for (const Shape& s : model.shapes()) has_shape[s.body] = true;
+  for (const Shape& s : model.shapes())
+    if (s.type != ShapeType::kMesh) has_shape[s.body] = true;
 
   // Equal chains of one level, in the order of the model, side by side.
   std::map<std::pair<int, std::string>, std::vector<Chain>> groups;

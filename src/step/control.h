@@ -6,35 +6,8 @@
 
 namespace stickslip::step::inline STICKSLIP_KERNELS {
 
-/// cos t and sin(t) / t from t^2. Where |t| < 1/4 from their series, which need no root, no
-/// division and no quadrant: error below 7e-17 in double, 3.5e-8 in float; beyond, up to |t| = 3,
-/// 4e-16 and 2e-7.
-template <class S>
-STICKSLIP_INLINE void cos_and_sinc(S t2, S& cosine, S& sinc) {
-  const auto c = [](double k) { return constant<S>(k); };
-  const S one = c(1);
-  S a = madd(t2, c(1.0 / 479001600), c(-1.0 / 3628800));
-  a = madd(t2, a, c(1.0 / 40320));
-  a = madd(t2, a, c(-1.0 / 720));
-  a = madd(t2, a, c(1.0 / 24));
-  a = madd(t2, a, c(-1.0 / 2));
-  cosine = madd(t2, a, one);
-  S b = madd(t2, c(-1.0 / 39916800), c(1.0 / 362880));
-  b = madd(t2, b, c(-1.0 / 5040));
-  b = madd(t2, b, c(1.0 / 120));
-  b = madd(t2, b, c(-1.0 / 6));
-  sinc = madd(t2, b, one);
-  const auto large = !(t2 < c(1.0 / 16));
-  if (!any(large)) return;
-  const S t = select(large, sqrt(t2), one);
-  S s, k;
-  sincos(t, s, k);
-  cosine = select(large, k, cosine);
-  sinc = select(large, s / t, sinc);
-}
-
 /// Brings a quaternion to unit length: by a Newton step where it nearly is, as after a rotation.
-/// NaN where its square overflows.
+/// Not finite where its square overflows or is zero.
 template <class S>
 STICKSLIP_INLINE void normalize(S quaternion[4]) {
   const S zero = constant<S>(0), one = constant<S>(1);

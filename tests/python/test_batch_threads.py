@@ -70,15 +70,17 @@ def test_two_threads_on_one_batch_are_told() -> None:
 
 def test_first_use_of_a_parameter_during_a_step_is_told() -> None:
     batch = ss.Batch(anymal(), 64, num_threads=1)
-    stepping = threading.Thread(target=batch.step, args=(20000,))
+    stepping = threading.Thread(target=batch.step, args=(100000,))
     stepping.start()
-    time.sleep(0.02)
+    until = time.monotonic() + 60
+    while not batch.time[0] > 0 and time.monotonic() < until:  # written every few thousand steps
+        time.sleep(1e-3)
     for name in ("body_mass", "kp", "generalized_force", "external_wrench"):
         with pytest.raises(ValueError, match="another thread is at work on this batch"):
             getattr(batch, name)
     assert batch.q.shape == (64, 19)  # which is there already
     assert stepping.is_alive()
-    stepping.join(60)
+    stepping.join(120)
     assert batch.body_mass.min() > 0 and not batch.generalized_force.any()
 
 

@@ -226,6 +226,8 @@ def test_each_episode_draws_friction_and_mass() -> None:
         (partial(randomization.friction, low=2.0), r"friction: \(low, high\) is .*; low must not exceed high"),
         (partial(randomization.base_mass, low=-50.0), r"base_mass: low is -50\.0; the base has \d+\.\d+ kg"),
         (partial(randomization.base_mass, high=np.nan), r"base_mass: \(low, high\) is"),
+        (partial(randomization.base_mass, high=np.inf), "base_mass: high is inf; it must be finite"),
+        (partial(randomization.friction, high=np.inf), "friction: high is inf; it must be finite"),
     ],
 )
 def test_randomization_that_no_robot_can_have_is_named(term: Any, words: str) -> None:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip._arguments import interval
+from stickslip._arguments import interval, number
 
 if TYPE_CHECKING:
     from stickslip.envs.anymal_flat import AnymalFlat
@@ -27,18 +27,24 @@ Randomization = Callable[["AnymalFlat", Indices], None]
 
 def friction(task: AnymalFlat, envs: Indices, low: float = 0.5, high: float = 1.25) -> None:
     """One Coulomb coefficient for all shapes of a robot."""
-    if not interval("friction: (low, high)", (low, high))[0] >= 0:
+    if not _bounds("friction", low, high)[0] >= 0:
         raise ValueError(f"friction: low is {low}; it must be zero or positive")
     task.batch.friction[envs] = task.random.uniform(envs, low, high)[:, None]
 
 
 def base_mass(task: AnymalFlat, envs: Indices, low: float = -5.0, high: float = 5.0) -> None:
     """Adds mass to the base [kg]; its inertia grows in proportion, its center of mass stays."""
-    if not interval("base_mass: (low, high)", (low, high))[0] > -task.base.mass:
+    if not np.float32(1.0 + _bounds("base_mass", low, high)[0] / task.base.mass) > 0:
         raise ValueError(f"base_mass: low is {low}; the base has {task.base.mass} kg and must keep some")
     ratio = 1.0 + task.random.uniform(envs, low, high) / task.base.mass
     task.batch.body_mass[envs, 0] = ratio * task.base.mass
     task.batch.body_inertia[envs, 0] = ratio[:, None] * task.base.inertia[UPPER]
+
+
+def _bounds(name: str, low: float, high: float) -> tuple[float, float]:
+    """Finite bounds of what a function draws."""
+    low, high = interval(f"{name}: (low, high)", (low, high))
+    return number(f"{name}: low", low), number(f"{name}: high", high)
 
 
 def initial_state(

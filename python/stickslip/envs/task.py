@@ -9,7 +9,7 @@ from __future__ import annotations
 import inspect
 import operator
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
@@ -19,7 +19,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip._arguments import count, number
-from stickslip._batch_inputs import numbers
+from stickslip._batch_inputs import cast, numbers
 from stickslip.envs.infos import vector_info
 from stickslip.envs.streams import Envs, RandomStreams
 from stickslip.world import StepStatus, World
@@ -168,7 +168,7 @@ class VectorTask(VectorEnv):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
 
-    def __reduce__(self) -> Any:
+    def __reduce__(self) -> NoReturn:
         raise TypeError(  # for copy, deepcopy and pickle alike
             f"a {type(self).__name__} can be neither copied nor pickled; make another one with the same arguments"
         )
@@ -432,7 +432,7 @@ def _seed(name: str, value: Any) -> int:
 
 def _noise(value: ArrayLike, shape: tuple[int, ...]) -> Array:
     """Finite numbers, one per element of an observation."""
-    given = numbers("observation_noise", value).astype(np.float32)
+    given = cast(numbers("observation_noise", value), np.dtype(np.float32))
     if given.shape not in ((), shape):
         raise ValueError(f"observation_noise has shape {given.shape}; it must be a number, or {shape}: one per element")
     if not np.isfinite(given).all():

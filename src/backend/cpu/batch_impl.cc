@@ -185,12 +185,14 @@ void Batch::Impl::reset(long env, const double* q, const double* u) {
 
 BatchArray Batch::Impl::array(BatchField field) {
   using enum BatchField;
-  const bool known = memory.has(field) && (force || field != kGeneralizedForce);
+  const bool of_bodies = field == kBodyMass || field == kBodyCom || field == kBodyInertia;
+  const bool known = of_bodies                    ? bodies.used()
+                     : field == kGeneralizedForce ? force
+                                                  : memory.has(field);
   if (known) return memory.array(field);
   const Hold hold(*this, "array");  // a first use allocates
   if (field == kGeneralizedForce) force = true;
-  const bool of_bodies = field == kBodyMass || field == kBodyCom || field == kBodyInertia;
-  if (of_bodies && !bodies.used()) bodies.allocate(memory);
+  if (of_bodies) bodies.allocate(memory);
   return memory.array(field);
 }
 

@@ -1,6 +1,7 @@
 // What kernels read of a model: every joint and body has one place, shapes and their points are
 // numbered.
 #include <set>
+#include <string>
 #include <utility>
 
 #include "check.h"
@@ -69,6 +70,34 @@ TEST(EveryJointHasOnePlaceAndItsParentComesBefore) {
       }
       CHECK(right);
     }
+}
+
+TEST(LinksWithShapesOrChainsCarrySomething) {
+  CHECK(TreeLayout(*shapes_on_two_links(BaseType::kFloating), 1).slots[0].carries);
+  std::mt19937 rng(2);
+  ModelBuilder builder(
+      "fork");  // hip - knee - two toes, the second with a sphere, a mesh on the knee
+  for (const char* link : {"base", "hip", "knee", "inner", "outer"})
+    builder.add_link(link, testing::random_inertial(rng));
+  const char* parents[] = {"base", "hip", "knee", "knee"};
+  const char* children[] = {"hip", "knee", "inner", "outer"};
+  for (int k = 0; k < 4; ++k) {
+    LinkJoint joint;
+    joint.name = std::string("to_") + children[k], joint.parent = parents[k];
+    joint.child = children[k], joint.type = LinkJointType::kRevolute, joint.axis = {0, 1, 0};
+    builder.add_joint(joint);
+  }
+  builder.add_shape("hip", shape(ShapeType::kMesh, {0, 0, 0}));
+  builder.add_shape("outer", shape(ShapeType::kSphere, {0.1, 0, 0}));
+  const ModelPtr fork = builder.build(BaseType::kFloating);
+  const TreeLayout tree(*fork, 1);
+  const bool expected[] = {false, true, false, true};
+  for (int joint = 0; joint < 4; ++joint) {
+    const std::string child = children[joint];
+    for (int j = 0; j < 4; ++j)
+      if (fork->joints()[j].name == "to_" + child)
+        CHECK(tree.slots[tree.link_of_body[j + 1].slot].carries == expected[joint]);
+  }
 }
 
 TEST(TurningABodyKeepsLengthsAndMasses) {

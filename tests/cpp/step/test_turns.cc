@@ -24,7 +24,7 @@ double error_of_series(double largest) {
     const Value<S> t2 = static_cast<Value<S>>(k * largest / 60000);
     const long double t = std::sqrt(static_cast<long double>(t2));
     S cosine, sinc;
-    step::cos_and_sinc(S(t2), cosine, sinc);
+    cos_and_sinc(S(t2), cosine, sinc);
     const long double wanted = t > 0 ? std::sin(t) / t : 1;
     worst = std::max({worst, std::fabs(get_lane(cosine, 0) - std::cos(t)),
                       std::fabs(get_lane(sinc, 0) - wanted)});
@@ -79,6 +79,40 @@ TEST(CosineAndSincAreGoodToHalfAnUlpOfOneWhereSeriesMakeThem) {
   CHECK(error_of_series<float>(9) < 2e-7);
   CHECK((error_of_series<Pack<double, 4>>(9) == error_of_series<double>(9)));
   CHECK((error_of_series<Pack<float, 8>>(9) == error_of_series<float>(9)));
+}
+
+/// Lanes in the series and beyond, near unit length and far from it, side by side.
+template <class S>
+void check_mixed_lanes() {
+  constexpr int kWidth = ScalarTraits<S>::kWidth;
+  using T = Value<S>;
+  S t2, cosine, sinc, q[4];
+  for (int lane = 0; lane < kWidth; ++lane) {
+    set_lane(t2, lane, static_cast<T>(lane % 3 == 1 ? 2.0 + lane : 0.007 * lane));
+    for (int k = 0; k < 4; ++k)
+      set_lane(q[k], lane, static_cast<T>((0.5 + 1e-9 * k) * (lane % 2 ? 1 + lane : 1)));
+  }
+  cos_and_sinc(t2, cosine, sinc);
+  S unit[4] = {q[0], q[1], q[2], q[3]};
+  step::normalize(unit);
+  for (int lane = 0; lane < kWidth; ++lane) {
+    T c, s, alone[4];
+    cos_and_sinc(get_lane(t2, lane), c, s);
+    CHECK(get_lane(cosine, lane) == c && get_lane(sinc, lane) == s);
+    for (int k = 0; k < 4; ++k) alone[k] = get_lane(q[k], lane);
+    step::normalize(alone);
+    for (int k = 0; k < 4; ++k) {
+      CHECK(get_lane(unit[k], lane) == alone[k]);
+      CHECK_NEAR(alone[k], 0.5, sizeof(T) == 4 ? 1e-7 : 3e-9);
+    }
+  }
+}
+
+TEST(LanesOfBothKindsSideBySideHaveTheBitsOfOneAlone) {
+  check_mixed_lanes<Pack<double, 4>>();
+  check_mixed_lanes<Pack<double, 8>>();
+  check_mixed_lanes<Pack<float, 8>>();
+  check_mixed_lanes<Pack<float, 16>>();
 }
 
 TEST(TurnsFollowTheExponentialMap) {
