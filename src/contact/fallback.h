@@ -64,18 +64,21 @@ class Fallback {
     for (int i = 0; i < p_.size(); ++i) set_impulse(p_.contact(i), none);
     accumulate<M>(p_);
   }
+  /// As `certify` has it: the largest residual, plus the most that the rounding of an impulse
+  /// hides.
   double residual() {
-    double worst = 0, sum = 0;
+    double worst = 0, hidden = 0, sum = 0;
     for (int i = 0; i < p_.size(); ++i) {
       const FactoredContact<double>& c = p_.contact(i);
       double v[3], l[3];
       contact_velocity<M>(c, p_.w, v);
       store(c.lambda, l);
-      const double e = natural_map_residual(c.local, v, l) + impulse_rounding(c.local, l);
+      const double e = natural_map_residual_squared(c.local, v, l);
       worst = max(worst, e);
+      hidden = max(hidden, impulse_rounding(c.local, l));
       sum += e;
     }
-    return worst + 0 * sum;  // NaN if any is
+    return sqrt(worst) + hidden + 0 * sum;  // NaN if any is
   }
   bool keep_if_better() {
     const double r = residual();

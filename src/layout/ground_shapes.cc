@@ -95,10 +95,12 @@ std::vector<GroundShape> ground_shapes(const Model& model, const TreeLayout& lay
   return out;
 }
 
+bool makes_contact(ShapeType type) { return ground_type(type).has_value(); }
+
 std::vector<int> unsupported_shapes(const Model& model) {
   std::vector<int> out;
   for (size_t i = 0; i < model.shapes().size(); ++i)
-    if (!ground_type(model.shapes()[i].type)) out.push_back(static_cast<int>(i));
+    if (!makes_contact(model.shapes()[i].type)) out.push_back(static_cast<int>(i));
   return out;
 }
 

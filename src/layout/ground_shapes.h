@@ -12,6 +12,9 @@ namespace stickslip::layout {
 /// them).
 std::vector<collide::GroundShape> ground_shapes(const Model& model, const TreeLayout& layout);
 
+/// Whether contacts are computed for shapes of this kind.
+bool makes_contact(ShapeType type);
+
 /// Indices of shapes that no contact is computed for.
 std::vector<int> unsupported_shapes(const Model& model);
 

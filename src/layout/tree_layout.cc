@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "layout/ground_shapes.h"
 #include "model/pose.h"
 
 namespace stickslip::layout {
@@ -82,7 +83,7 @@ TreeLayout::TreeLayout(const Model& model, int lanes_per_bundle)
   if (floating) base = model.bodies()[0].inertial;
   std::vector<bool> has_shape(model.bodies().size(), false);
   for (const Shape& s : model.shapes())
-    if (s.type != ShapeType::kMesh) has_shape[s.body] = true;
+    if (makes_contact(s.type)) has_shape[s.body] = true;
 
   // Equal chains of one level, in the order of the model, side by side.
   std::map<std::pair<int, std::string>, std::vector<Chain>> groups;

@@ -190,7 +190,7 @@ BatchArray Batch::Impl::array(BatchField field) {
                      : field == kGeneralizedForce ? force
                                                   : memory.has(field);
   if (known) return memory.array(field);
-  const Hold hold(*this, "array");  // a first use allocates
+  const Hold hold(*this, "array (first use of a parameter)");  // it allocates
   if (field == kGeneralizedForce) force = true;
   if (of_bodies) bodies.allocate(memory);
   return memory.array(field);
