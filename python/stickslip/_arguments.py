@@ -8,10 +8,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 
+def _float(value: Any) -> float:
+    if isinstance(value, (str, bytes)):  # which float() would read
+        raise TypeError
+    return float(value)
+
+
 def number(name: str, value: Any) -> float:
     """A finite float."""
     try:
-        result = float(value)
+        result = _float(value)
     except (TypeError, ValueError):
         raise TypeError(f"{name} is {value!r}; a number is wanted") from None
     if not np.isfinite(result):
@@ -19,10 +25,21 @@ def number(name: str, value: Any) -> float:
     return result
 
 
+def limit(name: str, value: Any) -> float:
+    """A positive float; it may be infinite."""
+    try:
+        result = _float(value)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name} is {value!r}; a number is wanted") from None
+    if not result > 0:
+        raise ValueError(f"{name} is {result}; it must be positive")
+    return result
+
+
 def interval(name: str, value: Any) -> tuple[float, float]:
     """Bounds (low, high), low <= high; they may be infinite."""
     try:
-        low, high = map(float, value)
+        low, high = map(_float, value)
     except (TypeError, ValueError):
         raise TypeError(f"{name} is {value!r}; a pair of numbers (low, high) is wanted") from None
     if not low <= high:

@@ -57,6 +57,16 @@ def cast(values: NDArray[Any], dtype: np.dtype) -> NDArray[Any]:
         return values.astype(dtype, copy=False)
 
 
+def per_element(name: str, value: Any, shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """Finite float32 numbers (shape), from one number or one per element. Read-only."""
+    given = cast(numbers(name, value), np.dtype(np.float32))
+    if given.shape not in ((), shape):
+        raise ValueError(f"{name} has shape {given.shape}; it must be a number, or {shape}: one per element")
+    if not np.isfinite(given).all():
+        raise ValueError(f"{name} is {value}; it must be finite")
+    return np.broadcast_to(given, shape)
+
+
 def environments(name: str, where: Any, num_envs: int) -> NDArray[np.int64]:
     """Indices of a boolean mask (num_envs,), or integer indices, each in range and once."""
     given = _taken(name, where)

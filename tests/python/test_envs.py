@@ -425,6 +425,23 @@ def test_actions_are_clipped_to_their_space() -> None:
             TypeError,
             "observations: 'speed' is .*ObservationTerm",
         ),
+        (
+            {"config": AnymalFlatConfig(observations={"speed": (observations.joint_velocity, np.nan)})},
+            ValueError,
+            "observations: the scale of 'speed' is nan; it must be finite",
+        ),
+        (
+            {"config": AnymalFlatConfig(observations={"speed": (observations.joint_velocity, 1.0, (1.0, 2.0))})},
+            ValueError,
+            r"observations: the noise of 'speed' has shape \(2,\); it must be a number, or \(12,\)",
+        ),
+        ({"config": AnymalFlatConfig(rewards={"alive": ("2", rewards.alive)})}, TypeError, "weight of 'alive' is '2'"),
+        (
+            {"config": AnymalFlatConfig(commands=Commands(left=("0", 1)))},
+            TypeError,
+            "commands.left is .'0', 1.; a pair",
+        ),
+        ({"config": AnymalFlatConfig(observation_limit=-1.0)}, ValueError, "observation_limit is -1.0; it must be"),
         ({"config": AnymalFlatConfig(randomization=None)}, TypeError, "randomization is a NoneType; a dict"),
         (
             {"config": AnymalFlatConfig(randomization={"mass": 3.0})},
@@ -475,6 +492,14 @@ def test_actions_are_clipped_to_their_space() -> None:
 def test_wrong_options_are_named(options: dict[str, Any], error: type, words: str) -> None:
     with pytest.raises(error, match=words):
         AnymalFlat(**options)
+
+
+def test_limits_may_be_infinite() -> None:
+    config = AnymalFlatConfig(action_limit=np.inf, observation_limit=np.inf)
+    envs = AnymalFlat(2, config=config)
+    assert np.isinf(envs.single_action_space.high).all() and np.isinf(envs.single_observation_space.high).all()
+    envs.reset(seed=0)
+    assert np.isfinite(envs.step(np.full((2, 12), 0.1, np.float32))[0]).all()
 
 
 def test_max_episode_steps_wins_over_the_configuration() -> None:

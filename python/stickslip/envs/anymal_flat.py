@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip import assets
-from stickslip._arguments import number
+from stickslip._arguments import limit, number
+from stickslip._batch_inputs import per_element
 from stickslip.envs.commands import Commands, uniform_commands
 from stickslip.envs.locomotion_state import Array, ContactColumns, LocomotionState, Mask
 from stickslip.envs.observations import ObservationTerm, default_observations
@@ -84,8 +85,7 @@ class AnymalFlatConfig:
         for name in ("action_scale", "base_height"):
             number(name, getattr(self, name))
         for name in ("action_limit", "observation_limit"):
-            if not number(name, getattr(self, name)) > 0:
-                raise ValueError(f"{name} is {getattr(self, name)}; it must be positive")
+            limit(name, getattr(self, name))
 
     def _check_terms(self) -> None:
         for where in ("observations", "rewards", "terminations", "randomization"):
@@ -168,9 +168,9 @@ class AnymalFlat(VectorTask):
             shape = np.shape(function(self.state))
             if len(shape) != 2 or shape[0] != self.num_envs:
                 raise ValueError(f"observation {name!r} has shape {shape}; it must be ({self.num_envs}, size)")
-            scale = np.asarray(scale, np.float32)
+            scale = per_element(f"observations: the scale of {name!r}", scale, shape[1:])
             self._terms.append((function, slice(begin, begin + shape[1]), scale))
-            noises.append(np.broadcast_to(scale * np.asarray(noise, np.float32), shape[1:]))
+            noises.append(scale * per_element(f"observations: the noise of {name!r}", noise, shape[1:]))
             begin += shape[1]
         self._observed = np.zeros((self.num_envs, begin), np.float32)
         if self.config.observation_noise:

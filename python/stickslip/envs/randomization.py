@@ -27,14 +27,16 @@ Randomization = Callable[["AnymalFlat", Indices], None]
 
 def friction(task: AnymalFlat, envs: Indices, low: float = 0.5, high: float = 1.25) -> None:
     """One Coulomb coefficient for all shapes of a robot."""
-    if not _bounds("friction", low, high)[0] >= 0:
+    low, high = _bounds("friction", low, high)
+    if not low >= 0:
         raise ValueError(f"friction: low is {low}; it must be zero or positive")
     task.batch.friction[envs] = task.random.uniform(envs, low, high)[:, None]
 
 
 def base_mass(task: AnymalFlat, envs: Indices, low: float = -5.0, high: float = 5.0) -> None:
     """Adds mass to the base [kg]; its inertia grows in proportion, its center of mass stays."""
-    if not np.float32(1.0 + _bounds("base_mass", low, high)[0] / task.base.mass) > 0:
+    low, high = _bounds("base_mass", low, high)
+    if not np.float32(1.0 + low / task.base.mass) > 0:
         raise ValueError(f"base_mass: low is {low}; the base has {task.base.mass} kg and must keep some")
     ratio = 1.0 + task.random.uniform(envs, low, high) / task.base.mass
     task.batch.body_mass[envs, 0] = ratio * task.base.mass

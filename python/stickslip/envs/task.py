@@ -19,7 +19,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip._arguments import count, number
-from stickslip._batch_inputs import cast, numbers
+from stickslip._batch_inputs import numbers, per_element
 from stickslip.envs.infos import vector_info
 from stickslip.envs.streams import Envs, RandomStreams
 from stickslip.world import StepStatus, World
@@ -161,7 +161,7 @@ class VectorTask(VectorEnv):
             raise ValueError(f"observe() returned shape {shape}; it must be ({self.num_envs}, size)")
         self._observation = np.zeros(shape, np.float32)
         if self.observation_noise is not None:
-            self.observation_noise = _noise(self.observation_noise, shape[1:])
+            self.observation_noise = per_element("observation_noise", self.observation_noise, shape[1:])
         limit, action = np.float32(self.observation_limit), np.float32(self.action_limit)
         self.single_observation_space = Box(-limit, limit, shape[1:], np.float32)
         self.single_action_space = Box(-action, action, (self.action_size,), np.float32)
@@ -428,16 +428,6 @@ def _seed(name: str, value: Any) -> int:
     if result < 0:
         raise ValueError(f"{name} is {result}; it must be zero or positive")
     return result
-
-
-def _noise(value: ArrayLike, shape: tuple[int, ...]) -> Array:
-    """Finite numbers, one per element of an observation."""
-    given = cast(numbers("observation_noise", value), np.dtype(np.float32))
-    if given.shape not in ((), shape):
-        raise ValueError(f"observation_noise has shape {given.shape}; it must be a number, or {shape}: one per element")
-    if not np.isfinite(given).all():
-        raise ValueError(f"observation_noise is {value}; it must be finite")
-    return np.broadcast_to(given, shape)
 
 
 def _autoreset_mode(value: AutoresetMode | str) -> AutoresetMode:
